@@ -1,0 +1,1 @@
+//! Whole-loop tests live in this package's `tests/` folder; there is no library code.
