@@ -1,0 +1,44 @@
+//! Running one program as a named step: what it is, how long it took, and a clear word when it fails.
+
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+
+/// Why a chore stopped, in words for a person.
+pub type Failure = String;
+
+/// The root folder of the workspace.
+pub fn workspace_root() -> PathBuf {
+    let own = Path::new(env!("CARGO_MANIFEST_DIR"));
+    own.parent().unwrap_or(own).to_path_buf()
+}
+
+/// `cargo` of the toolchain that runs this chore, started in the workspace root.
+pub fn cargo(arguments: &[&str]) -> Command {
+    let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
+    let mut command = Command::new(cargo);
+    command.args(arguments).current_dir(workspace_root());
+    command
+}
+
+/// Runs `command` to its end, with its output on the terminal; prints the step's name before and its time after.
+pub fn run(name: &str, command: &mut Command) -> Result<(), Failure> {
+    println!("==> {name}");
+    let started = Instant::now();
+    let status = command
+        .status()
+        .map_err(|error| format!("{name}: cannot start {:?}: {error}", command.get_program()))?;
+    let seconds = started.elapsed().as_secs_f64();
+    if !status.success() {
+        return Err(format!(
+            "{name} failed ({status}) after {seconds:.1} s; the lines above say why"
+        ));
+    }
+    println!("<== {name}: {seconds:.1} s");
+    Ok(())
+}
+
+/// Whether `command` starts and ends well; its output is dropped.
+pub fn succeeds(command: &mut Command) -> bool {
+    command.output().is_ok_and(|output| output.status.success())
+}
