@@ -1,0 +1,57 @@
+//! Rotations about the joint axes, and back to angles.
+
+use super::Quaternion;
+use nalgebra::Quaternion as Raw;
+
+/// `R_x(angle)`, radians.
+pub(super) fn about_x(angle: f32) -> Quaternion {
+    let (sin, cos) = libm::sincosf(0.5 * angle);
+    Quaternion::new_unchecked(Raw::new(cos, sin, 0.0, 0.0))
+}
+
+/// `R_x(flexion) R_y(abduction) R_z(twist)`, radians.
+pub(super) fn compose(flexion: f32, abduction: f32, twist: f32) -> Quaternion {
+    let (sy, cy) = libm::sincosf(0.5 * abduction);
+    let (sz, cz) = libm::sincosf(0.5 * twist);
+    about_x(flexion)
+        * Quaternion::new_unchecked(Raw::new(cy, 0.0, sy, 0.0))
+        * Quaternion::new_unchecked(Raw::new(cz, 0.0, 0.0, sz))
+}
+
+/// The three angles of [`compose`], radians: flexion and twist in [−π, π], abduction in [−π/2, π/2].
+///
+/// With R = R_x(a) R_y(b) R_z(c), the first row is (cos b cos c, −cos b sin c, sin b) and the last column is
+/// (sin b, −sin a cos b, cos a cos b). Near |b| = π/2 both a and c lose their meaning alone; c is therefore read from
+/// the rows turned back by the very a that is returned, and the three angles compose to R even there.
+pub(super) fn decompose(rotation: &Quaternion) -> [f32; 3] {
+    let q = rotation.quaternion();
+    let (w, x, y, z) = (q.w, q.i, q.j, q.k);
+    let r02 = 2.0 * (x * z + w * y);
+    let r12 = 2.0 * (y * z - w * x);
+    let r22 = 1.0 - 2.0 * (x * x + y * y);
+    let r10 = 2.0 * (x * y + w * z);
+    let r11 = 1.0 - 2.0 * (x * x + z * z);
+    let r20 = 2.0 * (x * z - w * y);
+    let r21 = 2.0 * (y * z + w * x);
+    let cos_b = libm::sqrtf(r12 * r12 + r22 * r22);
+    // Below this the last column is rounding error (a sensor's step is 2⁻¹⁴): no flexion can be read from it.
+    let a = if cos_b < 1e-5 {
+        0.0
+    } else {
+        libm::atan2f(-r12, r22)
+    };
+    let b = libm::atan2f(r02, cos_b);
+    let (sin_a, cos_a) = libm::sincosf(a);
+    let c = libm::atan2f(cos_a * r10 + sin_a * r20, cos_a * r11 + sin_a * r21);
+    [a, b, c]
+}
+
+/// The twist about x of a rotation (swing-twist decomposition), radians in (−π, π].
+///
+/// A half turn about an axis at right angles to x has no twist; zero is returned for it.
+pub(super) fn twist_about_x(rotation: &Quaternion) -> f32 {
+    let q = rotation.quaternion();
+    // q and −q are one rotation; the half with w ≥ 0 keeps the angle within half a turn.
+    let (w, x) = if q.w < 0.0 { (-q.w, -q.i) } else { (q.w, q.i) };
+    2.0 * libm::atan2f(x, w)
+}

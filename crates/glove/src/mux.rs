@@ -1,0 +1,1 @@
+//! The TCA9548A multiplexer.

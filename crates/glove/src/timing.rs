@@ -1,0 +1,1 @@
+//! Every time the glove waits for.
