@@ -1,0 +1,360 @@
+//! Image bytes to a [`Checked`] token: the full check, at once or in pieces.
+
+use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+
+use super::{
+    ALIGNMENT, Checked, Element, Error, FORMAT, HEADER_LEN, Header, JointOrder, MAGIC, Meta,
+    encoded_len, lane_words, offset, record_words, shape_is_valid,
+};
+use crate::{INPUT_LIMIT, LANES, units_per_lane};
+
+/// CRC-32 as in zip and Ethernet: polynomial 0x04C11DB7 reflected, initial and final exclusive-or 0xFFFFFFFF.
+static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+
+/// Bytes that one [`Verifier::step`] takes at most through the CRC.
+const CRC_STEP: usize = 1024;
+
+/// CRC-32 of a whole image, its own four bytes left out.
+pub(crate) fn crc32(image: &[u8]) -> u32 {
+    let mut digest = CRC32.digest();
+    digest.update(&image[..offset::CRC]);
+    digest.update(&image[offset::CRC + 4..]);
+    digest.finalize()
+}
+
+/// Checks the image at the start of `bytes` completely: header, length, CRC-32, padding, finite parameters, no sum that
+/// could overflow. Bytes after the image are not looked at (a flash slot is longer than its image).
+///
+/// # Errors
+/// The first thing found wrong. Never panics, whatever the bytes.
+pub fn parse(bytes: &[u8]) -> Result<Checked, Error> {
+    let mut verifier = Verifier::new(bytes)?;
+    loop {
+        if let Some(checked) = verifier.step(bytes)? {
+            return Ok(checked);
+        }
+    }
+}
+
+/// As [`parse`], and refuses bytes after the image: for files.
+///
+/// # Errors
+/// As [`parse`], and [`Error::TrailingBytes`].
+pub fn parse_exact(bytes: &[u8]) -> Result<Checked, Error> {
+    let header = read_header(bytes)?;
+    if bytes.len() > header.length {
+        return Err(Error::TrailingBytes {
+            found: bytes.len(),
+            expected: header.length,
+        });
+    }
+    parse(bytes)
+}
+
+/// The check of [`parse`] in pieces, so that a loop with a time limit can do it: each step looks at about 1 KB for the
+/// CRC, then at one lane. It does not hold the bytes; the caller passes the same ones every time.
+pub struct Verifier {
+    header: Header,
+    stage: Stage,
+}
+
+enum Stage {
+    Crc {
+        next: usize,
+        digest: Digest<'static, u32>,
+    },
+    Lanes {
+        next: usize,
+        bound: HiddenBound,
+    },
+}
+
+impl Verifier {
+    /// Checks the header and begins.
+    ///
+    /// # Errors
+    /// What is wrong with the header, its length or the alignment of the bytes.
+    pub fn new(bytes: &[u8]) -> Result<Self, Error> {
+        let header = read_header(bytes)?;
+        Ok(Self {
+            header,
+            stage: Stage::Crc {
+                next: 0,
+                digest: CRC32.digest(),
+            },
+        })
+    }
+
+    /// The next piece: `Some` when everything was found right.
+    ///
+    /// # Errors
+    /// What is wrong; call no more after that. Other bytes than at the start show as a wrong CRC.
+    pub fn step(&mut self, bytes: &[u8]) -> Result<Option<Checked>, Error> {
+        let header = self.header;
+        let Some(image) = bytes.get(..header.length) else {
+            return Err(Error::Truncated {
+                found: bytes.len(),
+                needed: header.length,
+            });
+        };
+        match &mut self.stage {
+            Stage::Crc { next, digest } => {
+                let end = (*next + CRC_STEP).min(image.len());
+                update_without_own_bytes(digest, image, *next, end);
+                *next = end;
+                if end == image.len() {
+                    let computed = digest.clone().finalize();
+                    if computed != header.crc {
+                        return Err(Error::Crc {
+                            found: header.crc,
+                            computed,
+                        });
+                    }
+                    check_reserved(image, offset::RESERVED, HEADER_LEN)?;
+                    self.stage = Stage::Lanes {
+                        next: 0,
+                        bound: HiddenBound::new(),
+                    };
+                }
+            }
+            Stage::Lanes { next, bound } => {
+                let words = payload(image, &header)?;
+                if *next < LANES {
+                    check_lane(words, &header, *next, bound)?;
+                    *next += 1;
+                } else {
+                    check_output_bias(image, words, &header, bound)?;
+                    return Ok(Some(Checked { header }));
+                }
+            }
+        }
+        Ok(None)
+    }
+}
+
+fn update_without_own_bytes(
+    digest: &mut Digest<'static, u32>,
+    image: &[u8],
+    start: usize,
+    end: usize,
+) {
+    if start == 0 {
+        digest.update(&image[..offset::CRC]);
+        digest.update(&image[offset::CRC + 4..end]);
+    } else {
+        digest.update(&image[start..end]);
+    }
+}
+
+fn field<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
+    let mut field = [0; N];
+    if let Some(source) = bytes.get(at..at + N) {
+        field.copy_from_slice(source);
+    }
+    field
+}
+
+fn u16_at(bytes: &[u8], at: usize) -> u16 {
+    u16::from_le_bytes(field(bytes, at))
+}
+
+fn u32_at(bytes: &[u8], at: usize) -> u32 {
+    u32::from_le_bytes(field(bytes, at))
+}
+
+/// The CRC stated in an image's header; 0 if the bytes are too few.
+pub(crate) fn stated_crc(bytes: &[u8]) -> u32 {
+    u32_at(bytes, offset::CRC)
+}
+
+/// Reads and checks the header against itself, the bytes' length and their alignment.
+fn read_header(bytes: &[u8]) -> Result<Header, Error> {
+    if bytes.len() < HEADER_LEN {
+        return Err(Error::Truncated {
+            found: bytes.len(),
+            needed: HEADER_LEN,
+        });
+    }
+    let magic = field(bytes, 0);
+    if magic != MAGIC {
+        return Err(Error::Magic { found: magic });
+    }
+    let format = u16_at(bytes, offset::FORMAT);
+    if format != FORMAT {
+        return Err(Error::Format { found: format });
+    }
+    let header_len = u16_at(bytes, offset::HEADER_LEN);
+    if usize::from(header_len) != HEADER_LEN {
+        return Err(Error::HeaderLength { found: header_len });
+    }
+    let element = match u16_at(bytes, offset::ELEMENT) {
+        1 => Element::F32,
+        found => return Err(Error::Element { found }),
+    };
+    let order = u16_at(bytes, offset::ORDER);
+    let joint_order = JointOrder::from_id(order).ok_or(Error::JointOrder { found: order })?;
+    let shape =
+        [offset::INPUTS, offset::HIDDEN, offset::OUTPUTS].map(|at| u32_at(bytes, at) as usize);
+    let [inputs, hidden, outputs] = shape;
+    if !shape_is_valid(inputs, hidden, outputs) {
+        return Err(Error::Shape { found: shape });
+    }
+    if joint_order.inputs().is_some_and(|n| n != inputs) {
+        return Err(Error::JointOrderInputs {
+            order: joint_order,
+            inputs,
+        });
+    }
+    let length = u32_at(bytes, offset::LENGTH) as usize;
+    let expected = encoded_len(inputs, hidden, outputs);
+    if length != expected {
+        return Err(Error::Length {
+            found: length,
+            expected,
+        });
+    }
+    if bytes.len() < length {
+        return Err(Error::Truncated {
+            found: bytes.len(),
+            needed: length,
+        });
+    }
+    let misaligned = bytes.as_ptr().addr() % ALIGNMENT;
+    if misaligned != 0 {
+        return Err(Error::Alignment { offset: misaligned });
+    }
+    let meta = Meta {
+        model_id: u32_at(bytes, offset::MODEL_ID),
+        version: u32_at(bytes, offset::VERSION),
+        joint_order,
+    };
+    Ok(Header {
+        inputs,
+        hidden,
+        outputs,
+        element,
+        meta,
+        length,
+        crc: stated_crc(bytes),
+    })
+}
+
+fn check_reserved(image: &[u8], start: usize, end: usize) -> Result<(), Error> {
+    match image[start..end].iter().position(|&byte| byte != 0) {
+        Some(at) => Err(Error::Reserved { offset: start + at }),
+        None => Ok(()),
+    }
+}
+
+/// The words after the header: lane records, b2, padding.
+fn payload<'a>(image: &'a [u8], header: &Header) -> Result<&'a [f32], Error> {
+    let bytes = image
+        .get(HEADER_LEN..header.length)
+        .ok_or(Error::Truncated {
+            found: image.len(),
+            needed: header.length,
+        })?;
+    bytemuck::try_cast_slice(bytes).map_err(|_| Error::Alignment {
+        offset: bytes.as_ptr().addr() % ALIGNMENT,
+    })
+}
+
+/// One lane: padded units all zero, every parameter finite; adds the lane to the overflow bound.
+fn check_lane(
+    words: &[f32],
+    header: &Header,
+    lane: usize,
+    bound: &mut HiddenBound,
+) -> Result<(), Error> {
+    let stride = record_words(header.inputs, header.hidden, header.outputs);
+    let units = units_per_lane(header.hidden);
+    let start = lane * stride;
+    let record = &words[start..start + stride];
+    let byte_offset = |word: usize| HEADER_LEN + 4 * (start + word);
+    if let Some(at) = record.iter().position(|v| !v.is_finite()) {
+        return Err(Error::NotFinite {
+            at: byte_offset(at),
+        });
+    }
+    for m in 0..units {
+        let column = || record.iter().skip(m).step_by(units);
+        if m * LANES + lane >= header.hidden {
+            if let Some(section) = column().position(|v| v.to_bits() != 0) {
+                return Err(Error::Reserved {
+                    offset: byte_offset(section * units + m),
+                });
+            }
+        } else {
+            bound.unit(
+                record[m],
+                column().skip(1).take(header.inputs),
+                column().skip(1 + header.inputs),
+            );
+        }
+    }
+    Ok(())
+}
+
+fn check_output_bias(
+    image: &[u8],
+    words: &[f32],
+    header: &Header,
+    bound: &HiddenBound,
+) -> Result<(), Error> {
+    let start = lane_words(header.inputs, header.hidden, header.outputs);
+    let b2 = &words[start..start + header.outputs];
+    if let Some(at) = b2.iter().position(|v| !v.is_finite()) {
+        return Err(Error::NotFinite {
+            at: HEADER_LEN + 4 * (start + at),
+        });
+    }
+    check_reserved(
+        image,
+        HEADER_LEN + 4 * (start + header.outputs),
+        header.length,
+    )?;
+    if bound.is_safe(b2.iter()) {
+        Ok(())
+    } else {
+        Err(Error::Overflow)
+    }
+}
+
+/// Bound of every partial sum for inputs within ±2π: Σ_j max_x|w2_xj|·(|b1_j| + 2π·Σ_i|w1_ji|), plus max_x|b2_x|.
+///
+/// Taken over the worst output, it may refuse weights within a factor X of overflow, some 10³⁶ away from any trained map.
+/// The factor of two below f32::MAX covers the rounding of the bound itself and of the sums.
+pub(crate) struct HiddenBound {
+    sum: f32,
+    largest_hidden: f32,
+}
+
+impl HiddenBound {
+    pub(crate) fn new() -> Self {
+        Self {
+            sum: 0.0,
+            largest_hidden: 0.0,
+        }
+    }
+
+    pub(crate) fn unit<'a>(
+        &mut self,
+        b1: f32,
+        w1: impl Iterator<Item = &'a f32>,
+        w2: impl Iterator<Item = &'a f32>,
+    ) {
+        let weights: f32 = w1.map(|w| w.abs()).sum();
+        let hidden = b1.abs() + weights * INPUT_LIMIT;
+        let largest = w2.fold(0.0f32, |largest, w| largest.max(w.abs()));
+        self.largest_hidden = self.largest_hidden.max(hidden);
+        self.sum += largest * hidden;
+    }
+
+    /// NaN cannot hide an overflow: parameters are finite here, and sums of positive values only grow; 0·∞ shows in
+    /// `largest_hidden`.
+    pub(crate) fn is_safe<'a>(&self, b2: impl Iterator<Item = &'a f32>) -> bool {
+        let bias = b2.fold(0.0f32, |largest, b| largest.max(b.abs()));
+        let limit = f32::MAX / 2.0;
+        self.largest_hidden <= limit && self.sum + bias <= limit
+    }
+}
