@@ -1,0 +1,117 @@
+//! Errors as a person meets them: the thing and its value, then the next step.
+//!
+//! Inside the tool errors travel as `anyhow::Error`. Whatever a person can cause is a [`Failure`], which carries what
+//! to try next and the exit code; [`report`] prints either as `error: …` and `try: …`.
+
+use std::fmt;
+
+/// Exit code when the work was done.
+pub const EXIT_DONE: u8 = 0;
+/// Exit code when the work failed.
+pub const EXIT_FAILED: u8 = 1;
+/// Exit code when the command was given wrongly.
+pub const EXIT_USAGE: u8 = 2;
+
+/// One fault a person can meet: what it is and what to do next.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Failure {
+    what: String,
+    next: String,
+    exit: u8,
+}
+
+impl Failure {
+    /// A failure of the work: exit code 1. `what` names the thing and its value, `next` the next step.
+    pub fn new(what: impl Into<String>, next: impl Into<String>) -> Self {
+        Self {
+            what: what.into(),
+            next: next.into(),
+            exit: EXIT_FAILED,
+        }
+    }
+
+    /// A command given wrongly: exit code 2.
+    pub fn usage(what: impl Into<String>, next: impl Into<String>) -> Self {
+        Self {
+            exit: EXIT_USAGE,
+            ..Self::new(what, next)
+        }
+    }
+
+    /// What a person can do next.
+    pub fn next_step(&self) -> &str {
+        &self.next
+    }
+
+    /// The process's exit code.
+    pub fn exit_code(&self) -> u8 {
+        self.exit
+    }
+}
+
+impl fmt::Display for Failure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what)
+    }
+}
+
+impl std::error::Error for Failure {}
+
+/// Turns an error into a [`Failure`] that names the thing it happened to.
+pub trait OrFail<T> {
+    /// `what` names the thing ("the model file a.safetensors"); the error's own text follows it after a colon.
+    ///
+    /// # Errors
+    /// The failure, where `self` was an error.
+    fn or_fail(self, what: impl FnOnce() -> String, next: impl Into<String>) -> anyhow::Result<T>;
+}
+
+impl<T, E: fmt::Display> OrFail<T> for Result<T, E> {
+    fn or_fail(self, what: impl FnOnce() -> String, next: impl Into<String>) -> anyhow::Result<T> {
+        self.map_err(|error| Failure::new(format!("{}: {error}", what()), next).into())
+    }
+}
+
+/// The lines for standard error, and the exit code.
+pub fn report(error: &anyhow::Error) -> (String, u8) {
+    let failure = error.downcast_ref::<Failure>();
+    let mut text = format!("error: {}", one_line(&format!("{error:#}")));
+    if let Some(failure) = failure.filter(|failure| !failure.next.is_empty()) {
+        text.push_str("\n  try: ");
+        text.push_str(&one_line(&failure.next));
+    }
+    (text, failure.map_or(EXIT_FAILED, Failure::exit_code))
+}
+
+fn one_line(text: &str) -> String {
+    text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn report_is_one_line_for_the_fault_and_one_for_the_next_step() {
+        let error: anyhow::Error =
+            Failure::new("the file a.csv:\n row 3 is empty", "look at row 3").into();
+        let (text, code) = report(&error);
+        assert_eq!(
+            text,
+            "error: the file a.csv: row 3 is empty\n  try: look at row 3"
+        );
+        assert_eq!(code, EXIT_FAILED);
+    }
+
+    #[test]
+    fn context_keeps_the_next_step_and_the_exit_code() {
+        let error = anyhow::Error::from(Failure::usage("--seconds is 0", "give 1 or more"))
+            .context("the run did not start");
+        let (text, code) = report(&error);
+        assert_eq!(
+            text,
+            "error: the run did not start: --seconds is 0\n  try: give 1 or more"
+        );
+        assert_eq!(code, EXIT_USAGE);
+    }
+}

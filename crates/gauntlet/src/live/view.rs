@@ -1,0 +1,105 @@
+//! The numbers of one moment, ready to be shown.
+
+use std::time::Duration;
+
+use crate::stats::short_or_dash;
+
+/// One finger's five angles.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Finger {
+    /// Its name.
+    pub name: &'static str,
+    /// Angles in radians, base first, as the joints are ordered everywhere.
+    pub angles: [f32; 5],
+    /// Human limits of each, radians.
+    pub limits: [(f32, f32); 5],
+    /// Whether every sensor that these angles need is good.
+    pub good: bool,
+}
+
+/// One axis of the gripper, counts.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// Its name.
+    pub name: &'static str,
+    /// Position last commanded.
+    pub asked: Option<u8>,
+    /// Position last measured.
+    pub reached: Option<u8>,
+    /// What the gripper says about it.
+    pub word: &'static str,
+}
+
+/// Everything the view shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct View {
+    /// What runs.
+    pub title: String,
+    /// Time since the loop started.
+    pub elapsed: Duration,
+    /// When it will end by itself.
+    pub total: Option<Duration>,
+    /// The bridge's state in a word or two.
+    pub state: String,
+    /// Whether the gripper follows the hand.
+    pub following: bool,
+    /// The fingers, thumb first.
+    pub fingers: Vec<Finger>,
+    /// The gripper's axes.
+    pub axes: Vec<Axis>,
+    /// Glove frames a second.
+    pub frames_per_s: f64,
+    /// Gripper cycles a second.
+    pub cycles_per_s: f64,
+    /// From the oldest sample used to the command's departure, µs: half of all commands were faster.
+    pub latency_p50: Option<u64>,
+    /// The same for 99 of 100.
+    pub latency_p99: Option<u64>,
+    /// Frames not answered by a command while following.
+    pub dropped: u64,
+    /// What is wrong now, in words; empty when all is well.
+    pub faults: Vec<String>,
+    /// Faults since the start.
+    pub fault_count: u64,
+    /// What keys do.
+    pub keys: &'static str,
+}
+
+impl View {
+    /// The view in one line, for a log file or a pipe.
+    pub fn line(&self) -> String {
+        let axes: Vec<String> = self
+            .axes
+            .iter()
+            .map(|axis| {
+                format!(
+                    "{} {:>3}→{:<3}",
+                    axis.name,
+                    count(axis.asked),
+                    count(axis.reached)
+                )
+            })
+            .collect();
+        let fault = if self.faults.is_empty() {
+            String::new()
+        } else {
+            format!(" | {}", self.faults.join("; "))
+        };
+        format!(
+            "{:5.1} s  {:<10} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{fault}",
+            self.elapsed.as_secs_f64(),
+            self.state,
+            axes.join("  "),
+            self.frames_per_s,
+            self.cycles_per_s,
+            short_or_dash(self.latency_p50),
+            short_or_dash(self.latency_p99),
+            self.dropped,
+        )
+    }
+}
+
+/// A count, or a dash.
+pub(super) fn count(value: Option<u8>) -> String {
+    value.map_or_else(|| "–".to_owned(), |value| value.to_string())
+}

@@ -1,0 +1,234 @@
+//! Numbers of a run in bounded memory: latency percentiles, rates.
+
+use std::collections::VecDeque;
+use std::time::Duration;
+
+/// Buckets to an octave: a percentile is right to 1/64, 1.6 %.
+const STEPS: usize = 64;
+/// Values up to 2^24 µs, 16.8 s; anything longer counts as that.
+const OCTAVES: usize = 24;
+
+/// Percentiles of durations with 1.6 % resolution in 12 kB, however long the run.
+#[derive(Debug, Clone)]
+pub struct Percentiles {
+    buckets: Vec<u64>,
+    count: u64,
+    longest_us: u64,
+}
+
+impl Default for Percentiles {
+    fn default() -> Self {
+        Self {
+            buckets: vec![0; STEPS * OCTAVES],
+            count: 0,
+            longest_us: 0,
+        }
+    }
+}
+
+fn bucket_of(us: u64) -> usize {
+    let us = us.min((1 << OCTAVES) - 1);
+    if us < STEPS as u64 {
+        return us as usize;
+    }
+    let octave = us.ilog2() as usize - STEPS.ilog2() as usize;
+    // Between STEPS and 2·STEPS within its octave.
+    let step = (us >> octave) as usize;
+    octave * STEPS + step
+}
+
+/// Upper edge of a bucket.
+fn edge_of(bucket: usize) -> u64 {
+    if bucket < 2 * STEPS {
+        return bucket as u64;
+    }
+    let octave = bucket / STEPS - 1;
+    let step = (bucket - octave * STEPS) as u64;
+    ((step + 1) << octave) - 1
+}
+
+impl Percentiles {
+    /// Counts one duration in.
+    pub fn add(&mut self, us: u64) {
+        if let Some(bucket) = self.buckets.get_mut(bucket_of(us)) {
+            *bucket += 1;
+        }
+        self.count += 1;
+        self.longest_us = self.longest_us.max(us);
+    }
+
+    /// The duration, in µs, that a share `share` (0 to 1) of all stay within; `None` before the first.
+    pub fn at(&self, share: f64) -> Option<u64> {
+        let wanted = ((share * self.count as f64).ceil() as u64).clamp(1, self.count.max(1));
+        let mut seen = 0;
+        self.buckets.iter().enumerate().find_map(|(bucket, count)| {
+            seen += count;
+            (*count > 0 && seen >= wanted).then(|| edge_of(bucket).min(self.longest_us))
+        })
+    }
+
+    /// How many durations were counted.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// The longest, µs.
+    pub fn longest(&self) -> Option<u64> {
+        (self.count > 0).then_some(self.longest_us)
+    }
+}
+
+/// Events a second: over the last second, and over the whole run.
+#[derive(Debug, Clone, Default)]
+pub struct Rate {
+    /// Times of the last second's events, µs.
+    recent: VecDeque<u64>,
+    first_us: Option<u64>,
+    last_us: u64,
+    count: u64,
+}
+
+/// More events than this in one second are not kept one by one.
+const RECENT: usize = 1024;
+/// The window of the momentary rate.
+const WINDOW_US: u64 = 1_000_000;
+
+impl Rate {
+    /// Counts one event at `us`.
+    pub fn add(&mut self, us: u64) {
+        self.first_us.get_or_insert(us);
+        self.last_us = self.last_us.max(us);
+        self.count += 1;
+        if self.recent.len() == RECENT {
+            self.recent.pop_front();
+        }
+        self.recent.push_back(us);
+        self.forget(us);
+    }
+
+    fn forget(&mut self, now_us: u64) {
+        while self
+            .recent
+            .front()
+            .is_some_and(|first| now_us.saturating_sub(*first) > WINDOW_US)
+        {
+            self.recent.pop_front();
+        }
+    }
+
+    /// Events a second over the last second before `now_us`; 0 with fewer than two events in it.
+    pub fn now(&mut self, now_us: u64) -> f64 {
+        self.forget(now_us);
+        let (Some(first), Some(last)) = (self.recent.front(), self.recent.back()) else {
+            return 0.0;
+        };
+        // A stream that stopped is divided by the time since, so that its rate falls to zero and does not freeze.
+        let quiet = now_us.saturating_sub(*last);
+        let mean = (last - first) / (self.recent.len() as u64 - 1).max(1);
+        let span = if quiet > 2 * mean.max(1) {
+            now_us - first
+        } else {
+            last - first
+        };
+        ratio(self.recent.len() as u64 - 1, span)
+    }
+
+    /// Events a second from the first event to the last.
+    pub fn mean(&self) -> f64 {
+        self.first_us.map_or(0.0, |first| {
+            ratio(self.count - 1, self.last_us.saturating_sub(first))
+        })
+    }
+
+    /// All events.
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+}
+
+fn ratio(events: u64, span_us: u64) -> f64 {
+    if span_us == 0 {
+        return 0.0;
+    }
+    events as f64 / (span_us as f64 / 1e6)
+}
+
+/// A short duration as a person reads it: `3.4 ms`, `870 µs`, `1.20 s`.
+pub fn short(us: u64) -> String {
+    match us {
+        0..1_000 => format!("{us} µs"),
+        1_000..1_000_000 => format!("{:.1} ms", us as f64 / 1e3),
+        _ => format!("{:.2} s", us as f64 / 1e6),
+    }
+}
+
+/// The same for an optional one; `–` where there is none.
+pub fn short_or_dash(us: Option<u64>) -> String {
+    us.map_or_else(|| "–".to_owned(), short)
+}
+
+/// Seconds as a person reads them: `3.2 s`, `1 min 05 s`.
+pub fn seconds(time: Duration) -> String {
+    let s = time.as_secs_f64();
+    if s < 60.0 {
+        format!("{s:.1} s")
+    } else {
+        format!("{} min {:02} s", s as u64 / 60, s as u64 % 60)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_within_two_percent_of_sorted_values() {
+        let mut percentiles = Percentiles::default();
+        let mut values: Vec<u64> = (0..20_000u64).map(|i| (i * i * 7919) % 900_001).collect();
+        values.iter().for_each(|value| percentiles.add(*value));
+        values.sort_unstable();
+        for share in [0.5, 0.9, 0.99, 1.0] {
+            let exact = values[(share * values.len() as f64).ceil() as usize - 1] as f64;
+            let found = percentiles.at(share).unwrap() as f64;
+            assert!(
+                (found - exact).abs() <= 0.02 * exact,
+                "{share}: {found} {exact}"
+            );
+        }
+        assert_eq!(percentiles.longest(), values.last().copied());
+    }
+
+    #[test]
+    fn every_bucket_ends_where_its_values_do() {
+        for us in (0..5_000).chain([1 << 20, (1 << 24) - 1, u64::MAX]) {
+            let edge = edge_of(bucket_of(us));
+            assert_eq!(bucket_of(edge), bucket_of(us), "{us}");
+            assert!(edge >= us.min((1 << 24) - 1));
+        }
+    }
+
+    #[test]
+    fn nothing_counted_gives_no_percentile() {
+        assert_eq!(Percentiles::default().at(0.5), None);
+    }
+
+    #[test]
+    fn rate_of_a_steady_stream_is_its_frequency_and_falls_when_it_stops() {
+        let mut rate = Rate::default();
+        for i in 0..200 {
+            rate.add(i * 10_000);
+        }
+        let last = 199 * 10_000;
+        assert!((rate.now(last) - 100.0).abs() < 1.5);
+        assert!((rate.mean() - 100.0).abs() < 0.01);
+        assert!(rate.now(last + 500_000) < 60.0);
+        assert_eq!(rate.now(last + 2_000_000), 0.0);
+    }
+
+    #[test]
+    fn durations_read_as_people_say_them() {
+        assert_eq!(short(870), "870 µs");
+        assert_eq!(short(3_440), "3.4 ms");
+        assert_eq!(seconds(Duration::from_secs(65)), "1 min 05 s");
+    }
+}
