@@ -1,0 +1,336 @@
+//! One serial line with a device at its end: queues, byte times, and noise at a wrong baud.
+//!
+//! Used by the in-memory wire on a virtual clock and by the pseudo-terminal on the real one.
+
+use std::collections::VecDeque;
+
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+
+use crate::{Device, Instant};
+
+/// Bits a character takes on the line: start, 8 data, stop.
+const BITS_PER_CHARACTER: u64 = 10;
+/// Bytes the client's side holds before it refuses more, as a kernel's buffer does.
+const QUEUE: usize = 4096;
+/// Two UARTs understand each other when their rates differ by less than this many per mille.
+const BAUD_TOLERANCE: u64 = 30;
+/// Out of four garbled characters, about one comes back as noise.
+const NOISE_ONE_IN: u32 = 4;
+
+/// A character in flight, with the moment (ns) its last bit has passed.
+struct Flying {
+    arrival: u64,
+    byte: u8,
+    /// Rate at which it was sent.
+    baud: u32,
+}
+
+/// A device, the wire to it, and the client's UART at this end.
+///
+/// Times are kept in nanoseconds inside, so that 21.7 µs characters do not drift.
+pub struct Line<D> {
+    device: D,
+    baud: u32,
+    to_device: VecDeque<Flying>,
+    to_client: VecDeque<Flying>,
+    client_busy: u64,
+    device_busy: u64,
+    noise: ChaCha8Rng,
+    sent: u64,
+    received: u64,
+}
+
+/// Time of one character in ns at `baud`.
+pub(crate) fn character_ns(baud: u32) -> u64 {
+    BITS_PER_CHARACTER * 1_000_000_000 / u64::from(baud.max(1))
+}
+
+fn ns(t: Instant) -> u64 {
+    t.as_ticks().saturating_mul(1_000)
+}
+
+/// The first whole microsecond at which something of `ns` has happened.
+fn instant(ns: u64) -> Instant {
+    Instant::from_ticks(ns.div_ceil(1_000))
+}
+
+fn same_rate(a: u32, b: u32) -> bool {
+    u64::from(a.abs_diff(b)) * 1_000 <= BAUD_TOLERANCE * u64::from(a.max(b))
+}
+
+impl<D: Device> Line<D> {
+    /// A line to `device`; the client's UART runs at `baud`.
+    pub fn new(device: D, baud: u32) -> Self {
+        Self {
+            device,
+            baud,
+            to_device: VecDeque::new(),
+            to_client: VecDeque::new(),
+            client_busy: 0,
+            device_busy: 0,
+            noise: ChaCha8Rng::seed_from_u64(0x004E_4F49_5345),
+            sent: 0,
+            received: 0,
+        }
+    }
+
+    /// The client's rate, in baud.
+    pub fn baud(&self) -> u32 {
+        self.baud
+    }
+
+    /// Sets the client's rate for bytes written from now on.
+    pub fn set_baud(&mut self, baud: u32) {
+        self.baud = baud.max(1);
+    }
+
+    /// The device at the end.
+    pub fn device(&self) -> &D {
+        &self.device
+    }
+
+    /// The device at the end.
+    pub fn device_mut(&mut self) -> &mut D {
+        &mut self.device
+    }
+
+    /// Bytes the client has sent, and bytes that have come back to it.
+    pub fn traffic(&self) -> (u64, u64) {
+        (self.sent, self.received)
+    }
+
+    /// Takes what fits of `bytes` into the client's send queue at `now`; returns how many.
+    pub fn write(&mut self, bytes: &[u8], now: Instant) -> usize {
+        self.run_until(now);
+        let count = bytes.len().min(QUEUE - self.to_device.len().min(QUEUE));
+        for &byte in bytes.iter().take(count) {
+            self.client_busy = self.client_busy.max(ns(now)) + character_ns(self.baud);
+            self.to_device.push_back(Flying {
+                arrival: self.client_busy,
+                byte,
+                baud: self.baud,
+            });
+        }
+        self.sent += count as u64;
+        count
+    }
+
+    /// How many bytes have arrived at the client by `now`.
+    pub fn available(&mut self, now: Instant) -> usize {
+        self.run_until(now);
+        self.to_client.partition_point(|f| f.arrival <= ns(now))
+    }
+
+    /// Moves bytes that have arrived by `now` into `out`; returns how many.
+    pub fn read(&mut self, out: &mut [u8], now: Instant) -> usize {
+        let count = self.available(now).min(out.len());
+        for (slot, flying) in out.iter_mut().zip(self.to_client.drain(..count)) {
+            *slot = flying.byte;
+        }
+        self.received += count as u64;
+        count
+    }
+
+    /// Forgets everything in flight and unread, as a pulled plug does.
+    pub fn clear(&mut self) {
+        self.to_device.clear();
+        self.to_client.clear();
+    }
+
+    /// The next moment after `after` worth waking for: the end of what is now on its way to the
+    /// client, the end of what is on its way to the device, or the device's own next act.
+    ///
+    /// Bursts are not cut into single characters: whoever wakes finds all of them.
+    pub fn next_event(&mut self, after: Instant) -> Option<Instant> {
+        self.run_until(after);
+        let queues = [self.to_client.back(), self.to_device.back()];
+        let flights = queues.into_iter().flatten().map(|f| instant(f.arrival));
+        flights
+            .chain(self.device.next_due())
+            .filter(|t| *t > after)
+            .min()
+    }
+
+    /// Lets everything happen, in order, that happens by `now`.
+    pub fn run_until(&mut self, now: Instant) {
+        let mut idle_due = None;
+        loop {
+            let byte = self.to_device.front().map(|f| instant(f.arrival));
+            let due = self.device.next_due().filter(|d| Some(*d) != idle_due);
+            let byte_first = byte.is_some_and(|b| due.is_none_or(|d| b <= d));
+            if byte_first {
+                if byte.is_none_or(|b| b > now) {
+                    return;
+                }
+                let Some(flying) = self.to_device.pop_front() else {
+                    return;
+                };
+                self.deliver(&flying);
+                self.collect(instant(flying.arrival));
+                idle_due = None;
+            } else if let Some(at) = due.filter(|d| *d <= now) {
+                // A device that stays due without sending must not hold the line for ever.
+                if self.collect(at) == 0 && self.device.next_due() == Some(at) {
+                    idle_due = Some(at);
+                }
+            } else {
+                return;
+            }
+        }
+    }
+
+    fn deliver(&mut self, flying: &Flying) {
+        let at = instant(flying.arrival);
+        if same_rate(flying.baud, self.device.baud()) {
+            self.device.receive(&[flying.byte], at);
+            return;
+        }
+        self.device.baud_seen(flying.baud);
+        let draw = self.noise.next_u32();
+        let [garbled, noise, ..] = draw.to_le_bytes();
+        self.device.receive(&[garbled], at);
+        if (draw >> 16).is_multiple_of(NOISE_ONE_IN) {
+            self.send_to_client(noise, at);
+        }
+    }
+
+    fn collect(&mut self, at: Instant) -> usize {
+        let mut chunk = [0u8; 64];
+        let mut total = 0;
+        loop {
+            let count = self.device.transmit(at, &mut chunk).min(chunk.len());
+            for &byte in chunk.iter().take(count) {
+                self.send_to_client(byte, at);
+            }
+            total += count;
+            if count < chunk.len() {
+                return total;
+            }
+        }
+    }
+
+    fn send_to_client(&mut self, byte: u8, at: Instant) {
+        let baud = self.device.baud();
+        self.device_busy = self.device_busy.max(ns(at)) + character_ns(baud);
+        let byte = if same_rate(baud, self.baud) {
+            byte
+        } else {
+            let [garbled, ..] = self.noise.next_u32().to_le_bytes();
+            garbled
+        };
+        if self.to_client.len() == QUEUE {
+            self.to_client.pop_front();
+        }
+        self.to_client.push_back(Flying {
+            arrival: self.device_busy,
+            byte,
+            baud,
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Duration;
+
+    /// Sends back each byte, one added, after a pause.
+    struct Echo {
+        pause: Duration,
+        waiting: VecDeque<(Instant, u8)>,
+    }
+
+    impl Echo {
+        fn line(pause_us: u64, baud: u32) -> Line<Echo> {
+            let pause = Duration::from_micros(pause_us);
+            Line::new(
+                Echo {
+                    pause,
+                    waiting: VecDeque::new(),
+                },
+                baud,
+            )
+        }
+    }
+
+    impl Device for Echo {
+        fn receive(&mut self, bytes: &[u8], now: Instant) {
+            self.waiting
+                .extend(bytes.iter().map(|b| (now + self.pause, b.wrapping_add(1))));
+        }
+        fn transmit(&mut self, now: Instant, out: &mut [u8]) -> usize {
+            let due = self
+                .waiting
+                .iter()
+                .take_while(|(t, _)| *t <= now)
+                .count()
+                .min(out.len());
+            for (slot, (_, byte)) in out.iter_mut().zip(self.waiting.drain(..due)) {
+                *slot = byte;
+            }
+            due
+        }
+        fn next_due(&self) -> Option<Instant> {
+            self.waiting.front().map(|(t, _)| *t)
+        }
+        fn baud(&self) -> u32 {
+            115_200
+        }
+    }
+
+    fn at(us: u64) -> Instant {
+        Instant::from_ticks(us)
+    }
+
+    #[test]
+    fn every_byte_takes_ten_bit_times_each_way() {
+        let mut line = Echo::line(1_000, 115_200);
+        assert_eq!(line.write(&[1, 2, 3], at(0)), 3);
+        // 86.8 us to the device, 1,000 us in it, 86.8 us back.
+        assert_eq!(line.available(at(1_173)), 0);
+        assert_eq!(line.available(at(1_174)), 1);
+        assert_eq!(line.available(at(1_348)), 3);
+        let mut out = [0; 8];
+        assert_eq!(line.read(&mut out, at(2_000)), 3);
+        assert_eq!(&out[..3], &[2, 3, 4]);
+        assert_eq!(line.traffic(), (3, 3));
+    }
+
+    #[test]
+    fn ten_thousand_characters_do_not_drift() {
+        let mut line = Echo::line(0, 115_200);
+        for _ in 0..3 {
+            line.write(&[0; 3_000], at(0));
+        }
+        // The queue holds 4,096 and refuses the rest; 4,096 x 86.8055 us = 355.555 ms.
+        let last = line.to_device.back().unwrap().arrival;
+        assert!(last.abs_diff(355_555_555) < 10_000, "{last}");
+    }
+
+    #[test]
+    fn a_wrong_baud_gives_noise_both_ways() {
+        let mut line = Echo::line(0, 9_600);
+        line.write(&[7; 100], at(0));
+        let mut out = [0; 512];
+        let count = line.read(&mut out, at(1_000_000));
+        assert!(count > 100, "echo and noise, got {count}");
+        let right = out[..count].iter().filter(|b| **b == 8).count();
+        assert!(right < count / 8, "{right} of {count} right by chance");
+    }
+
+    #[test]
+    fn events_lie_in_the_future_and_end() {
+        let mut line = Echo::line(500, 115_200);
+        line.write(&[1, 2], at(0));
+        let mut now = at(0);
+        let mut events = 0;
+        while let Some(next) = line.next_event(now) {
+            assert!(next > now);
+            now = next;
+            events += 1;
+            assert!(events < 20);
+        }
+        assert_eq!(line.available(now), 2);
+    }
+}

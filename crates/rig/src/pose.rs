@@ -1,0 +1,192 @@
+//! Where the virtual hand's joint angles come from.
+
+use thiserror::Error;
+
+/// Gives the 25 joint angles of the virtual hand at any time.
+///
+/// The 16 sensors sample at moments of their own, so times are asked for out of order by up to one
+/// sensor period (10 ms). The answer must depend on the time alone.
+pub trait PoseSource: Send {
+    /// Joint angles in radians, in the order of `glove::hand::JOINT_NAMES`, at `time_s` seconds
+    /// after the clock's start.
+    fn pose_at(&mut self, time_s: f64) -> [f32; 25];
+}
+
+impl<F: FnMut(f64) -> [f32; 25] + Send> PoseSource for F {
+    fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
+        self(time_s)
+    }
+}
+
+/// Why a recording cannot be used.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum RecordedError {
+    /// No row at all.
+    #[error("the recording has no rows: give at least one pose")]
+    Empty,
+    /// Times and rows differ in number.
+    #[error("the recording has {times} times for {rows} rows: give one time for each row")]
+    Length {
+        /// Number of times.
+        times: usize,
+        /// Number of rows.
+        rows: usize,
+    },
+    /// A time that is not finite or does not grow.
+    #[error("time {value} s of row {row} does not follow the row before: times must grow")]
+    Time {
+        /// Index of the row, from 0.
+        row: usize,
+        /// Its time, in seconds.
+        value: f64,
+    },
+}
+
+/// A recorded motion: linear interpolation between rows, from the top again after the last row.
+#[derive(Debug, Clone)]
+pub struct Recorded {
+    times: Vec<f64>,
+    rows: Vec<[f32; 25]>,
+    looping: bool,
+    held: bool,
+}
+
+impl Recorded {
+    /// From times (seconds, growing) and as many rows of 25 angles (radians). Repeats for ever;
+    /// the jump from the last row to the first is spread over the mean time between rows.
+    ///
+    /// # Errors
+    /// [`RecordedError`] names the row at fault.
+    pub fn new(times: Vec<f64>, rows: Vec<[f32; 25]>) -> Result<Self, RecordedError> {
+        if rows.is_empty() {
+            return Err(RecordedError::Empty);
+        }
+        if times.len() != rows.len() {
+            return Err(RecordedError::Length {
+                times: times.len(),
+                rows: rows.len(),
+            });
+        }
+        for (row, &value) in times.iter().enumerate() {
+            let follows = row == 0 || times.get(row - 1).is_some_and(|before| value > *before);
+            if !value.is_finite() || !follows {
+                return Err(RecordedError::Time { row, value });
+            }
+        }
+        Ok(Self {
+            times,
+            rows,
+            looping: true,
+            held: false,
+        })
+    }
+
+    /// From rows a fixed `rate_hz` apart.
+    ///
+    /// # Errors
+    /// [`RecordedError`] where there is no row or the rate is not positive.
+    pub fn at_rate(rows: Vec<[f32; 25]>, rate_hz: f64) -> Result<Self, RecordedError> {
+        let times = (0..rows.len()).map(|i| i as f64 / rate_hz).collect();
+        Self::new(times, rows)
+    }
+
+    /// Stays at the last row instead of starting again.
+    #[must_use]
+    pub fn once(mut self) -> Self {
+        self.looping = false;
+        self
+    }
+
+    /// Holds each row still until the time of the next: no pose between rows is ever shown.
+    #[must_use]
+    pub fn held(mut self) -> Self {
+        self.held = true;
+        self
+    }
+
+    /// Length in seconds, the step from the last row back to the first included.
+    #[must_use]
+    pub fn length_s(&self) -> f64 {
+        let span = self.times.last().unwrap_or(&0.0) - self.times.first().unwrap_or(&0.0);
+        match self.times.len() {
+            0 | 1 => 1.0,
+            n => span * n as f64 / (n - 1) as f64,
+        }
+    }
+}
+
+impl PoseSource for Recorded {
+    fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
+        let count = self.rows.len();
+        let start = self.times.first().copied().unwrap_or(0.0);
+        let offset = if time_s.is_finite() {
+            time_s.max(0.0)
+        } else {
+            0.0
+        };
+        let t = start
+            + if self.looping {
+                offset % self.length_s()
+            } else {
+                offset
+            };
+        let next = self.times.partition_point(|&x| x <= t);
+        let from = next.saturating_sub(1);
+        let (to, end) = if next < count {
+            (next, self.times[next])
+        } else if self.looping {
+            (0, start + self.length_s())
+        } else {
+            (from, t + 1.0)
+        };
+        if self.held {
+            return self.rows[from];
+        }
+        let part =
+            ((t - self.times[from]) / (end - self.times[from]).max(1e-9)).clamp(0.0, 1.0) as f32;
+        let (a, b) = (&self.rows[from], &self.rows[to]);
+        core::array::from_fn(|j| a[j] + (b[j] - a[j]) * part)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row(value: f32) -> [f32; 25] {
+        [value; 25]
+    }
+
+    #[test]
+    fn a_recording_is_interpolated_between_its_rows_and_starts_again() {
+        let mut r =
+            Recorded::new(vec![10.0, 11.0, 12.0], vec![row(0.0), row(1.0), row(0.5)]).unwrap();
+        assert_eq!(r.pose_at(0.0), row(0.0));
+        assert_eq!(r.pose_at(0.25), row(0.25));
+        assert_eq!(r.pose_at(1.5), row(0.75));
+        assert_eq!(r.pose_at(2.5), row(0.25), "from the last row to the first");
+        assert_eq!(r.pose_at(3.25), row(0.25));
+    }
+
+    #[test]
+    fn a_held_recording_shows_only_its_rows() {
+        let mut r = Recorded::at_rate(vec![row(0.0), row(1.0)], 1.0)
+            .unwrap()
+            .held()
+            .once();
+        assert_eq!(r.pose_at(0.99), row(0.0));
+        assert_eq!(r.pose_at(1.0), row(1.0));
+        assert_eq!(r.pose_at(99.0), row(1.0));
+        assert_eq!(r.pose_at(f64::NAN), row(0.0));
+    }
+
+    #[test]
+    fn a_recording_at_fault_names_the_row() {
+        assert_eq!(
+            Recorded::new(vec![], vec![]).unwrap_err(),
+            RecordedError::Empty
+        );
+        let e = Recorded::new(vec![0.0, 1.0, 1.0], vec![row(0.0); 3]).unwrap_err();
+        assert_eq!(e, RecordedError::Time { row: 2, value: 1.0 });
+    }
+}
