@@ -161,20 +161,26 @@ mod tests {
     }
 
     #[test]
-    fn the_volume_is_what_counting_cells_gives() {
-        // 85 cells of 3 counts an axis, counted by their midpoints; 60 scissor cells are free.
-        let middle = |cell: u32| 3.0 * cell as f32 + 1.5;
-        let mut inside = 0_u32;
-        for a in 0..85 {
-            for b in 0..85 {
-                inside += (0..85)
-                    .filter(|&c| contains(&[middle(a), middle(b), middle(c), 181.5]))
-                    .count() as u32;
+    fn the_volume_is_the_integral_of_its_cross_sections() {
+        // Above the limit, at finger A = a, B and C fill a square: its side is found by bisection
+        // of `contains`, its area summed over A.
+        let mut above = 0.0;
+        for step in 0..510 {
+            let a = 0.25 + step as f32 * 0.5;
+            let (mut low, mut high) = (0.0, 255.5);
+            for _ in 0..30 {
+                let middle = (low + high) / 2.0;
+                if contains(&[a, middle, middle, 200.0]) {
+                    low = middle
+                } else {
+                    high = middle
+                }
             }
+            above += f64::from(low / 255.0).powi(2) / 510.0;
         }
-        let fraction = (60.0 + 25.0 * f64::from(inside) / 85_f64.powi(3)) / 85.0;
+        let fraction = (180.0 + 75.0 * above) / 255.0;
         assert!(
-            (fraction - f64::from(VOLUME_FRACTION)).abs() < 5e-4,
+            (fraction - f64::from(VOLUME_FRACTION)).abs() < 1e-5,
             "{fraction}"
         );
     }
