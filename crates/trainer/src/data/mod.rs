@@ -1,0 +1,336 @@
+//! Samples: a plain matrix, the CSV files that carry poses, reference pairs and samples of any domain, the seeded split into a
+//! training and a test part, and the digest that names a data set.
+//!
+//! Units are those of the file: radians for joint angles, counts for gripper positions. Normalisation is the model's business.
+
+mod csv_file;
+
+pub use csv_file::{
+    Pairs, Poses, poses_from, read_pairs, read_poses, read_samples, read_truth, write_pairs,
+    write_poses, write_samples,
+};
+
+use crate::random::Random;
+use sha2::{Digest, Sha256};
+use std::path::{Path, PathBuf};
+
+/// Row-major samples: `rows` samples of `cols` values each. `data.len() == rows * cols` always holds for matrices made here.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Matrix {
+    /// Number of samples.
+    pub rows: usize,
+    /// Number of values a sample.
+    pub cols: usize,
+    /// The values, sample after sample.
+    pub data: Vec<f32>,
+}
+
+impl Matrix {
+    /// All zeros.
+    #[must_use]
+    pub fn zeros(rows: usize, cols: usize) -> Self {
+        Self {
+            rows,
+            cols,
+            data: vec![0.0; rows * cols],
+        }
+    }
+
+    /// `rows`×`cols` from values in row-major order; `None` when their number does not fit.
+    #[must_use]
+    pub fn from_vec(rows: usize, cols: usize, data: Vec<f32>) -> Option<Self> {
+        (data.len() == rows.checked_mul(cols)?).then_some(Self { rows, cols, data })
+    }
+
+    /// From rows of equal length.
+    #[must_use]
+    pub fn from_rows<const N: usize>(rows: &[[f32; N]]) -> Self {
+        Self {
+            rows: rows.len(),
+            cols: N,
+            data: rows.as_flattened().to_vec(),
+        }
+    }
+
+    /// Sample `index`. Panics when there is no such sample, as a slice does.
+    #[must_use]
+    pub fn row(&self, index: usize) -> &[f32] {
+        &self.data[index * self.cols..(index + 1) * self.cols]
+    }
+
+    /// Sample `index`, to be changed. Panics when there is no such sample, as a slice does.
+    pub fn row_mut(&mut self, index: usize) -> &mut [f32] {
+        &mut self.data[index * self.cols..(index + 1) * self.cols]
+    }
+
+    /// The samples, one after another. Nothing for a matrix without columns.
+    pub fn iter_rows(&self) -> impl ExactSizeIterator<Item = &[f32]> {
+        self.data.chunks_exact(self.cols.max(1))
+    }
+
+    /// Appends one sample; `false` (and nothing appended) when its length does not fit. An empty matrix takes any length.
+    pub fn push(&mut self, row: &[f32]) -> bool {
+        if self.rows == 0 {
+            self.cols = row.len();
+        }
+        if row.len() != self.cols {
+            return false;
+        }
+        self.data.extend_from_slice(row);
+        self.rows += 1;
+        true
+    }
+
+    /// The samples with these indices, in this order; indices out of range are passed over.
+    #[must_use]
+    pub fn select(&self, indices: &[usize]) -> Self {
+        let mut chosen = Self {
+            rows: 0,
+            cols: self.cols,
+            data: Vec::with_capacity(indices.len() * self.cols),
+        };
+        for &index in indices.iter().filter(|&&index| index < self.rows) {
+            chosen.data.extend_from_slice(self.row(index));
+            chosen.rows += 1;
+        }
+        chosen
+    }
+
+    /// Smallest and largest value of each column; empty for a matrix without samples.
+    #[must_use]
+    pub fn ranges(&self) -> Vec<(f32, f32)> {
+        if self.rows == 0 {
+            return Vec::new();
+        }
+        let mut ranges = vec![(f32::INFINITY, f32::NEG_INFINITY); self.cols];
+        for row in self.iter_rows() {
+            for (range, &value) in ranges.iter_mut().zip(row) {
+                *range = (range.0.min(value), range.1.max(value));
+            }
+        }
+        ranges
+    }
+
+    /// Adds shape and values to a digest.
+    fn digest(&self, hash: &mut Sha256) {
+        hash.update((self.rows as u64).to_le_bytes());
+        hash.update((self.cols as u64).to_le_bytes());
+        for value in &self.data {
+            hash.update(value.to_le_bytes());
+        }
+    }
+}
+
+/// The indices of a training and a test part, each in random order.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Split {
+    /// Samples to train on.
+    pub train: Vec<usize>,
+    /// Samples held out.
+    pub test: Vec<usize>,
+}
+
+/// Splits `rows` samples at random: round(`rows` · `fraction`) of them train (the paper's hand: 635 · 0.6 = 381), the rest test.
+/// `fraction` outside [0, 1] is taken to the nearest end. Equal seeds give equal splits.
+#[must_use]
+pub fn split(rows: usize, fraction: f64, seed: u64) -> Split {
+    let mut train: Vec<usize> = (0..rows).collect();
+    Random::new(seed, SPLIT_STREAM).shuffle(&mut train);
+    let count = libm::round(rows as f64 * fraction.clamp(0.0, 1.0)) as usize;
+    let test = train.split_off(count.min(rows));
+    Split { train, test }
+}
+
+/// Says clearly that a file has fewer samples than the work at hand needs (training needs more samples than pairs, and some to hold out).
+///
+/// # Errors
+/// [`Error::TooFewRows`].
+pub fn require_rows(file: &Path, found: usize, needed: usize) -> Result<(), Error> {
+    if found < needed {
+        return Err(Error::TooFewRows {
+            file: file.to_owned(),
+            found,
+            needed,
+        });
+    }
+    Ok(())
+}
+
+/// Random numbers of the split; other uses of one seed take other streams.
+const SPLIT_STREAM: u64 = 0x5350_4c49;
+
+/// SHA-256, in lower-case hexadecimal, over the shapes and little-endian values of these matrices in this order.
+#[must_use]
+pub fn sha256(matrices: &[&Matrix]) -> String {
+    let mut hash = Sha256::new();
+    for matrix in matrices {
+        matrix.digest(&mut hash);
+    }
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
+}
+
+/// What can be wrong with a file of samples. Rows are counted from 1 without the header; the line of the file comes with them.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file cannot be opened or read.
+    #[error(
+        "cannot read {}: {source}; check the path and that you may read it", file.display()
+    )]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error(
+        "cannot write {}: {source}; check that the folder exists and that you may write there", file.display()
+    )]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not text, or the quotes do not close.
+    #[error(
+        "{}, line {line}: not CSV text ({what}); save it as comma-separated UTF-8 text with one header line", file.display()
+    )]
+    NotCsv {
+        /// The file.
+        file: PathBuf,
+        /// Line of the fault, from 1.
+        line: u64,
+        /// What the reader said.
+        what: String,
+    },
+    /// No header line.
+    #[error(
+        "{} is empty; it needs a header line that names the columns, then one line a sample", file.display()
+    )]
+    Empty {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A column that is needed is not in the header.
+    #[error(
+        "{}: column `{column}` is missing ({}); add it to the header line and to every row", file.display(), Named(found)
+    )]
+    MissingColumn {
+        /// The file.
+        file: PathBuf,
+        /// The missing column.
+        column: String,
+        /// The header as it stands.
+        found: Vec<String>,
+    },
+    /// A column is in the header twice.
+    #[error(
+        "{}: column `{column}` is in the header twice; remove or rename one of them", file.display()
+    )]
+    DuplicateColumn {
+        /// The file.
+        file: PathBuf,
+        /// The column.
+        column: String,
+    },
+    /// A row has more or fewer fields than the header.
+    #[error(
+        "{}, line {line} (row {row}): {found} fields, the header has {expected}; complete or remove this row", file.display()
+    )]
+    Ragged {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// Fields in this row.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// A field is not a number.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: `{value}` is not a number; write it like 0.25, or remove this row", file.display()
+    )]
+    NotNumeric {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The field as written.
+        value: String,
+    },
+    /// A field is NaN, infinite, or too large for a 32-bit number.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: {value} is not a finite value; remove this row or fill the gap", file.display()
+    )]
+    NotFinite {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The field as written.
+        value: String,
+    },
+    /// Times do not grow.
+    #[error(
+        "{}, line {line} (row {row}), column `time_s`: {time_s} does not come after {before}; sort the rows by time and remove doubles", file.display()
+    )]
+    TimeNotIncreasing {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The time of this row.
+        time_s: f64,
+        /// The time of the row before.
+        before: f64,
+    },
+    /// Fewer rows than the work at hand needs.
+    #[error(
+        "{}: {found} rows, at least {needed} are needed; record more samples", file.display()
+    )]
+    TooFewRows {
+        /// The file.
+        file: PathBuf,
+        /// Rows found.
+        found: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+}
+
+/// A header as a person reads it in an error: the first names and how many more.
+struct Named<'a>(&'a [String]);
+
+impl core::fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        const SHOWN: usize = 6;
+        write!(f, "the header has {} columns: ", self.0.len())?;
+        write!(f, "{}", self.0[..self.0.len().min(SHOWN)].join(", "))?;
+        if self.0.len() > SHOWN {
+            write!(f, ", …")?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod matrix_tests;
+#[cfg(test)]
+mod tests;
