@@ -1,0 +1,161 @@
+//! What happened, for a person: typed, with its time, in a bounded queue.
+
+use crate::{Duration, Instant, State};
+use gripper::registers::Fault;
+
+/// Events that are kept until someone drains them. When the queue is full the oldest one goes and is counted.
+pub const CAPACITY: usize = 32;
+
+/// Something that happened.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Event {
+    /// When.
+    pub at: Instant,
+    /// What.
+    pub kind: Kind,
+}
+
+/// What can happen.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Kind {
+    /// The supervisor went from one state to another.
+    State {
+        /// State before.
+        from: State,
+        /// State now.
+        to: State,
+    },
+    /// No good sample of this segment's sensor for 100 ms while others came: the joints on both sides are held.
+    SensorLost {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// The sensor gives good samples again.
+    SensorBack {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// The sensor restarted, and its heading is worth nothing until the next calibration.
+    SensorRestarted {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// Frames come from the glove (or no longer do).
+    Glove {
+        /// Whether they come.
+        answers: bool,
+    },
+    /// The gripper answers (or no longer does).
+    Gripper {
+        /// Whether it answers.
+        answers: bool,
+    },
+    /// The gripper's fault changed; [`Fault::None`] when it is gone.
+    GripperFault(Fault),
+    /// The gripper was asked to activate: it moves.
+    ActivationRequested,
+    /// A flat hand was taken as calibration.
+    Calibrated,
+    /// No complete frame came for a calibration in time.
+    CalibrationFailed {
+        /// Segments without a good sample (bit k: segment k); all, when no frame came.
+        missing: u16,
+    },
+    /// A weights image is active.
+    Weights {
+        /// Its slot.
+        slot: usize,
+        /// Its model.
+        model_id: u32,
+        /// Its version.
+        version: u32,
+    },
+    /// No weights: the bridge answers and does not move.
+    NoWeights,
+    /// A supervisor step came late by more than 2 ms.
+    Late {
+        /// How late.
+        by: Duration,
+    },
+    /// A request that only an open clutch allows.
+    Refused(Request),
+}
+
+/// What only an open clutch allows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Request {
+    /// Activating the gripper while it follows the hand.
+    Activate,
+    /// Calibrating.
+    Calibrate,
+}
+
+impl core::fmt::Display for Kind {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let sensor = |segment: &usize| {
+            glove::hand::SEGMENT_NAMES
+                .get(*segment)
+                .copied()
+                .unwrap_or("unknown")
+        };
+        match self {
+            Kind::State { from, to } => write!(f, "{} → {to}", from.name()),
+            Kind::SensorLost { segment } => {
+                write!(
+                    f,
+                    "sensor {} lost: the joints on both sides of it are held",
+                    sensor(segment)
+                )
+            }
+            Kind::SensorBack { segment } => write!(f, "sensor {} is back", sensor(segment)),
+            Kind::SensorRestarted { segment } => {
+                write!(
+                    f,
+                    "sensor {} restarted, its heading is lost: calibrate again",
+                    sensor(segment)
+                )
+            }
+            Kind::Glove { answers: true } => f.write_str("the glove sends frames"),
+            Kind::Glove { answers: false } => {
+                f.write_str("the glove sends no frames: check its cable and power")
+            }
+            Kind::Gripper { answers: true } => f.write_str("the gripper answers"),
+            Kind::Gripper { answers: false } => {
+                f.write_str("the gripper does not answer: check its cable, power and slave id")
+            }
+            Kind::GripperFault(Fault::None) => f.write_str("the gripper's fault is gone"),
+            Kind::GripperFault(fault) => write!(f, "gripper {fault}"),
+            Kind::ActivationRequested => f.write_str("the gripper was asked to activate: it moves"),
+            Kind::Calibrated => f.write_str("calibrated on the flat hand"),
+            Kind::CalibrationFailed { missing } => {
+                f.write_str("not calibrated, no good sample from:")?;
+                for (segment, name) in glove::hand::SEGMENT_NAMES.iter().enumerate() {
+                    if missing & (1 << segment) != 0 {
+                        write!(f, " {name}")?;
+                    }
+                }
+                Ok(())
+            }
+            Kind::Weights {
+                slot,
+                model_id,
+                version,
+            } => {
+                write!(
+                    f,
+                    "weights: model {model_id:08x} version {version} from slot {slot}"
+                )
+            }
+            Kind::NoWeights => {
+                f.write_str("no weights: the bridge answers and does not move; flash an image")
+            }
+            Kind::Late { by } => write!(f, "a supervisor step came {} µs late", by.as_micros()),
+            Kind::Refused(Request::Activate) => f.write_str(
+                "not activated while the gripper follows the hand: release the clutch first",
+            ),
+            Kind::Refused(Request::Calibrate) => {
+                f.write_str("not calibrated while the clutch is closed: release it first")
+            }
+        }
+    }
+}

@@ -1,0 +1,131 @@
+//! From a frame of the glove to joint angles, with the joints beside a lost sensor held (rule 4).
+
+use crate::{HoldReason, Instant};
+use glove::hand::{self, Calibration, JOINT_COUNT, SEGMENT_COUNT, Side};
+use glove::scan::{Frame, Health};
+
+/// What a frame says about the hand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reading {
+    /// Joint angles in radians, in the order of [`hand::JOINT_NAMES`].
+    pub angles: [f32; JOINT_COUNT],
+    /// Segments without a usable sample in this frame (bit k: segment k).
+    pub missing: u16,
+    /// Joints that repeat their last good angle (bit j: joint j).
+    pub held: u32,
+    /// Stamp of the oldest sample used.
+    pub stamp: Instant,
+}
+
+/// Remembers the last good angle of every joint.
+#[derive(Debug, Clone)]
+pub struct Posture {
+    side: Side,
+    calibration: Calibration,
+    angles: [f32; JOINT_COUNT],
+    /// Joints that have been measured since the calibration.
+    known: u32,
+    /// Segments whose samples are not used although they look good.
+    distrusted: u16,
+}
+
+impl Posture {
+    /// Nothing measured yet.
+    pub fn new(side: Side, calibration: Calibration) -> Self {
+        Self {
+            side,
+            calibration,
+            angles: [0.0; JOINT_COUNT],
+            known: 0,
+            distrusted: 0,
+        }
+    }
+
+    /// The calibration in use.
+    pub fn calibration(&self) -> &Calibration {
+        &self.calibration
+    }
+
+    /// The last good angle of every joint, radians; zero where none was measured.
+    pub fn angles(&self) -> &[f32; JOINT_COUNT] {
+        &self.angles
+    }
+
+    /// Takes another calibration. Angles measured under the old one do not count, and every sensor is trusted again.
+    pub fn calibrate(&mut self, calibration: Calibration) {
+        *self = Self::new(self.side, calibration);
+    }
+
+    /// Does not use a segment's samples until the next calibration. Returns whether that is new.
+    pub fn distrust(&mut self, segment: usize) -> bool {
+        let bit = bit(segment);
+        let new = self.distrusted & bit == 0;
+        self.distrusted |= bit;
+        new
+    }
+
+    /// Reads a frame.
+    ///
+    /// With one sensor missing (not the `hand`), the joints on both sides of its segment keep their last good angle.
+    ///
+    /// # Errors
+    /// - `SensorsLost`: the `hand` sensor or two others are missing, or one is and a joint beside it was never measured.
+    /// - `InputRefused`: an angle is not finite, which checked samples cannot give.
+    pub fn read(&mut self, frame: &Frame) -> Result<Reading, HoldReason> {
+        let missing = missing(frame) | self.distrusted;
+        if missing & 1 != 0 || missing.count_ones() > 1 {
+            return Err(HoldReason::SensorsLost(missing));
+        }
+        let held = if missing == 0 {
+            0
+        } else {
+            hand::joints_of_segment(missing.trailing_zeros() as usize)
+        };
+        if held & !self.known != 0 {
+            return Err(HoldReason::SensorsLost(missing));
+        }
+        let orientations = frame.samples.map(|sample| sample.orientation);
+        let measured = hand::joint_angles(&orientations, &self.calibration, self.side);
+        let angles = core::array::from_fn(|joint| {
+            if held & (1 << joint) != 0 {
+                self.angles[joint]
+            } else {
+                measured[joint]
+            }
+        });
+        if !angles.iter().all(|angle: &f32| angle.is_finite()) {
+            return Err(HoldReason::InputRefused);
+        }
+        self.angles = angles;
+        self.known |= !held & hand::joints_of_segment(0);
+        let stamp = oldest(frame, missing).ok_or(HoldReason::SensorsLost(missing))?;
+        Ok(Reading {
+            angles,
+            missing,
+            held,
+            stamp,
+        })
+    }
+}
+
+/// Segments whose sample in this frame is not fresh and checked (bit k: segment k).
+pub fn missing(frame: &Frame) -> u16 {
+    frame
+        .samples
+        .iter()
+        .enumerate()
+        .filter(|(_, sample)| sample.health != Health::Good)
+        .fold(0, |mask, (segment, _)| mask | bit(segment))
+}
+
+/// Stamp of the oldest sample that is not missing.
+fn oldest(frame: &Frame, missing: u16) -> Option<Instant> {
+    (0..SEGMENT_COUNT)
+        .filter(|&segment| missing & bit(segment) == 0)
+        .map(|segment| frame.samples[segment].stamp)
+        .min()
+}
+
+fn bit(segment: usize) -> u16 {
+    1u16.checked_shl(segment as u32).unwrap_or(0)
+}

@@ -1,0 +1,347 @@
+//! What host and bridge say to each other, as postcard messages.
+//!
+//! The order of enum variants and struct fields **is** the wire format (postcard writes a variant's index and fields in
+//! order): append only, and raise [`VERSION`] when anything else changes. `docs/protocol.md` fixes it.
+
+use crate::config::SafeAction;
+use crate::{Counters as LoopCounters, Settings, State, config, filter, store, supervisor};
+use glove::hand::{JOINT_COUNT, Side};
+use gripper::{Activation, registers::Fault};
+use heapless::Vec;
+use serde::{Deserialize, Serialize};
+
+/// Version of the protocol. A bridge refuses a host of another version at hello.
+pub const VERSION: u16 = 1;
+/// Most bytes of a weights chunk: with its frame, less than half of a port's receive queue of 2,048 bytes.
+pub const CHUNK: usize = 512;
+/// Most axes of a gripper.
+pub const AXES: usize = 4;
+
+/// A value for each of the gripper's axes.
+pub type PerAxis<T> = Vec<T, AXES>;
+
+/// From the host. Stop and wait: the next request follows the reply to this one, or its timeout.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Request<'a> {
+    /// The session that hello began; the host chooses its number. A bridge that is busy with one refuses others.
+    pub session: u32,
+    /// Comes back in the reply. A request that is sent again keeps its number.
+    pub sequence: u16,
+    /// What is asked.
+    #[serde(borrow)]
+    pub call: Call<'a>,
+}
+
+/// What a host can ask.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Call<'a> {
+    /// Begins a session. Answer: [`Answer::Hello`].
+    Hello {
+        /// The host's [`VERSION`].
+        version: u16,
+    },
+    /// Answer: [`Answer::Status`].
+    Status,
+    /// Answer: [`Answer::Counters`].
+    Counters,
+    /// What both slots hold. Answer: [`Answer::Slots`].
+    Slots,
+    /// Begins an image in the slot that is not active, or goes on with the one of the same length and CRC that was
+    /// begun before. Answer: [`Answer::Received`].
+    WeightsBegin {
+        /// Bytes of the image.
+        length: u32,
+        /// CRC-32/ISO-HDLC of the whole image's bytes.
+        crc: u32,
+    },
+    /// Bytes of the image; what came before may come again. Answer: [`Answer::Received`].
+    WeightsChunk {
+        /// Where they begin.
+        offset: u32,
+        /// At most [`CHUNK`] bytes.
+        bytes: &'a [u8],
+    },
+    /// Checks the image and makes it active. Answer: [`Answer::Slots`].
+    WeightsCommit,
+    /// Gives up the image. Answer: [`Answer::Done`].
+    WeightsAbort,
+    /// Makes the image in a slot the active one. Answer: [`Answer::Slots`].
+    SelectSlot {
+        /// 0 or 1.
+        slot: u8,
+    },
+    /// Answer: [`Answer::Configuration`].
+    ConfigurationGet,
+    /// Refused while the clutch is closed. Kept until the next restart. Answer: [`Answer::Configuration`].
+    ConfigurationSet(Configuration),
+    /// Closes the clutch for 250 ms: say it every 100 ms. Answer: [`Answer::Status`].
+    Engage,
+    /// Opens the clutch. Answer: [`Answer::Status`].
+    Release,
+    /// Activates the gripper: **it moves**. Answer: [`Answer::Done`].
+    Activate,
+    /// Takes the next complete frame as the flat hand. Answer: [`Answer::Done`].
+    CalibrateFlatHand,
+    /// [`FromBridge::Sample`] every so often from now on. Answer: [`Answer::Done`].
+    Telemetry {
+        /// Milliseconds between samples, 20 or more; 0 ends them.
+        period_ms: u16,
+    },
+    /// Restarts the bridge after the reply. Refused while the clutch is closed. Answer: [`Answer::Done`].
+    Reboot,
+}
+
+/// From the bridge.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum FromBridge {
+    /// The answer to a request.
+    Reply(Reply),
+    /// What is now, unasked, while telemetry is on.
+    Sample(Sample),
+}
+
+/// The answer to a request.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reply {
+    /// The request's.
+    pub session: u32,
+    /// The request's.
+    pub sequence: u16,
+    /// The answer, or why there is none.
+    pub answer: Result<Answer, Refusal>,
+}
+
+/// Answers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Answer {
+    /// It was done.
+    Done,
+    /// To hello.
+    Hello(Hello),
+    /// To status, engage, release.
+    Status(Status),
+    /// To counters.
+    Counters(Counters),
+    /// To slots, commit, select.
+    Slots(Slots),
+    /// To begin and chunk: bytes of the image that are there; the next chunk begins here.
+    Received {
+        /// Bytes.
+        bytes: u32,
+    },
+    /// To configuration get and set.
+    Configuration(Configuration),
+}
+
+/// What the bridge is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Hello {
+    /// Its [`VERSION`].
+    pub version: u16,
+    /// Inputs, hidden units, outputs of the map it runs.
+    pub shape: [u16; 3],
+    /// Id of the joint order it takes.
+    pub joint_order: u16,
+    /// Most bytes of an image.
+    pub capacity: u32,
+    /// Most bytes of a chunk.
+    pub chunk: u16,
+}
+
+/// What the bridge is doing.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Status {
+    /// Microseconds since the bridge started.
+    pub now_us: u64,
+    /// The supervisor's state.
+    pub state: State,
+    /// Whether the clutch is closed.
+    pub engaged: bool,
+    /// Whether frames come from the glove.
+    pub glove_answers: bool,
+    /// The gripper, when it answers.
+    pub gripper: Option<GripperStatus>,
+    /// The active slot.
+    pub active_slot: Option<u8>,
+    /// Bytes there and bytes announced of an image under way.
+    pub transfer: Option<(u32, u32)>,
+}
+
+/// What the gripper says.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct GripperStatus {
+    /// gIMC.
+    pub activation: Activation,
+    /// gFLT.
+    pub fault: Fault,
+    /// gPR, counts.
+    pub echo: PerAxis<u8>,
+    /// gPO, counts.
+    pub position: PerAxis<u8>,
+}
+
+/// What both slots hold.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Slots {
+    /// The slot in use.
+    pub active: Option<u8>,
+    /// Slot 0 and slot 1.
+    pub contents: [SlotContents; 2],
+}
+
+/// What a slot holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum SlotContents {
+    /// Nothing was ever committed, or a write was begun.
+    Empty,
+    /// Something that is not what its record says, or not for this bridge.
+    Damaged,
+    /// A whole image.
+    Image {
+        /// The model's id.
+        model_id: u32,
+        /// The model's version.
+        version: u32,
+        /// Bytes.
+        length: u32,
+        /// CRC-32/ISO-HDLC of the whole image's bytes, computed from the flash for this answer.
+        crc: u32,
+    },
+}
+
+/// Counts since start.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counters {
+    /// Frames taken from the glove.
+    pub frames: u32,
+    /// Frames answered, in the step that took them, with a command that follows the hand.
+    pub answered_frames: u32,
+    /// Frames that gave no angles or were refused by the map.
+    pub unusable_frames: u32,
+    /// Commands that left.
+    pub commands: u32,
+    /// Statuses of the gripper.
+    pub statuses: u32,
+    /// Cycles of the gripper that ended in an error.
+    pub gripper_errors: u32,
+    /// Steps of the supervisor.
+    pub steps: u32,
+    /// Steps that came more than 2 ms late.
+    pub late_steps: u32,
+    /// The latest one, microseconds.
+    pub worst_late_us: u32,
+    /// How often motion was held.
+    pub holds: u32,
+    /// How often the gripper's fault ended motion.
+    pub faults: u32,
+    /// Frames of the host protocol: whole, wrong CRC, no COBS, too long.
+    pub host_frames: [u32; 4],
+    /// Messages of the host with a right CRC that were no requests.
+    pub host_malformed: u32,
+    /// Bytes that each port lost because a queue was full: host, glove, gripper.
+    pub bytes_lost: [u32; 3],
+}
+
+/// What is now.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Sample {
+    /// Microseconds since the bridge started.
+    pub now_us: u64,
+    /// The supervisor's state.
+    pub state: State,
+    /// Frames taken so far.
+    pub frame_sequence: u32,
+    /// Joint angles, radians.
+    pub angles: [f32; JOINT_COUNT],
+    /// Where the hand wants the gripper, counts; empty without.
+    pub target: PerAxis<f32>,
+    /// What the gripper is told, counts; empty when it is only read.
+    pub command: PerAxis<u8>,
+    /// Where the gripper is, counts; empty when it does not answer.
+    pub position: PerAxis<u8>,
+    /// From the oldest sample used to the command's leaving, microseconds.
+    pub latency_us: Option<u32>,
+}
+
+/// What a person may set, as [`Settings`].
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Configuration {
+    /// Which hand wears the glove.
+    pub side: Side,
+    /// Smoothing of the map's output.
+    pub filter: filter::Settings,
+    /// See [`Settings::fresh_frames`].
+    pub fresh_frames: u8,
+    /// See [`Settings::blend_ms`].
+    pub blend_ms: u16,
+    /// See [`Settings::rate`].
+    pub rate: f32,
+    /// See [`Settings::lead`].
+    pub lead: u8,
+    /// See [`Settings::safe_action`].
+    pub safe_action: SafeAction,
+    /// See [`Settings::open_rate`].
+    pub open_rate: f32,
+    /// See [`Settings::speed`].
+    pub speed: PerAxis<u8>,
+    /// See [`Settings::force`].
+    pub force: PerAxis<u8>,
+    /// See [`Settings::heading_is_relative`].
+    pub heading_is_relative: bool,
+}
+
+/// Why the bridge did not do what it was asked. Nothing has changed then.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub enum Refusal {
+    /// Host and bridge speak different versions.
+    Version {
+        /// The bridge's.
+        bridge: u16,
+    },
+    /// Hello first: no session, or another one since.
+    NoSession,
+    /// Another host holds the bridge: it keeps the clutch closed or writes an image.
+    Busy {
+        /// Its session.
+        session: u32,
+    },
+    /// The clutch is closed: release it first.
+    Engaged,
+    /// The weights store's word.
+    Store(store::Error),
+    /// The image's bytes are not those announced.
+    ImageCrc {
+        /// CRC of the bytes that came.
+        found: u32,
+        /// CRC announced.
+        announced: u32,
+    },
+    /// A setting out of its range.
+    Configuration {
+        /// Index in [`SETTING_NAMES`].
+        key: u8,
+        /// The value.
+        value: f32,
+        /// Least value allowed.
+        least: f32,
+        /// Greatest value allowed.
+        greatest: f32,
+    },
+    /// A telemetry period below 20 ms.
+    Period {
+        /// Least period, milliseconds.
+        least_ms: u16,
+    },
+}
+
+/// The names that [`Refusal::Configuration`] counts through.
+pub const SETTING_NAMES: [&str; 8] = [
+    "filter.min_cutoff",
+    "filter.beta",
+    "filter.derivative_cutoff",
+    "fresh_frames",
+    "blend_ms",
+    "rate",
+    "lead",
+    "open_rate",
+];

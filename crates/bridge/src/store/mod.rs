@@ -1,0 +1,483 @@
+//! The weights store: always a whole image, the old one or the new one, at any instant of a power cut (rule 5).
+//!
+//! Two slots, each flash of its own: the image from the slot's start, the commit records (`record`) in its last erase block. An
+//! image counts only with a record that names its length and CRC, and the record with the highest sequence decides which
+//! slot is active. Writing goes to the other slot, in this order:
+//!
+//! 1. erase the other slot's records, read back that they are gone: from here on it does not count, whatever it holds;
+//! 2. erase and program the image, block by block as its bytes come, each read back;
+//! 3. check the whole image in place (`hae::image::parse`: header, CRC, every weight), its shape, order and version;
+//! 4. program one record, read it back: from here on the new image is active.
+//!
+//! A cut before 4 leaves the active slot untouched; a cut inside 4 leaves a record that is whole, and then the image is
+//! too, or one that does not pass its own CRC. A cut inside 1 leaves the other slot's old record whole (its image has not
+//! been touched yet) or not a record. No step relies on what a cut left behind: writing starts by erasing.
+//!
+//! Program unit: [`PAGE`] bytes at most, a multiple of the flash's own unit, each programmed once per erase.
+
+mod error;
+mod record;
+
+pub use error::Error;
+
+use crate::platform::Slot;
+use embedded_storage::nor_flash::NorFlashError;
+use hae::image::{self, Checked, JointOrder};
+use record::Record;
+
+/// Bytes programmed at once, at most.
+pub const PAGE: usize = 256;
+
+/// What an image must be to be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Expected {
+    /// Inputs, hidden units, outputs.
+    pub shape: [usize; 3],
+    /// Order of the inputs.
+    pub joint_order: JointOrder,
+}
+
+/// A whole image in a slot.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Image {
+    /// Proof that it was checked; its header.
+    pub checked: Checked,
+    /// Sequence of its newest record.
+    pub sequence: u32,
+}
+
+/// What a slot holds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Contents {
+    /// No record: nothing was ever committed, or a write was begun.
+    Empty,
+    /// A record, and an image that is not what the record says or not for this bridge.
+    Damaged(Error),
+    /// A whole image.
+    Whole(Image),
+}
+
+/// An image on its way into a slot.
+#[derive(Debug)]
+struct Write {
+    slot: usize,
+    length: usize,
+    /// Bytes in flash; the page buffer comes after.
+    programmed: usize,
+    page: [u8; PAGE],
+    filled: usize,
+}
+
+impl Write {
+    fn taken(&self) -> usize {
+        self.programmed + self.filled
+    }
+}
+
+/// Two slots and what they hold.
+#[derive(Debug)]
+pub struct WeightsStore<F: Slot> {
+    slots: [F; 2],
+    contents: [Contents; 2],
+    active: Option<usize>,
+    expected: Expected,
+    write: Option<Write>,
+    locked: bool,
+}
+
+impl<F: Slot> WeightsStore<F> {
+    /// Reads both slots and takes the newest whole image that is what this bridge `expected`. Writes nothing.
+    pub fn new(slots: [F; 2], expected: Expected) -> Self {
+        let contents = [
+            inspect(0, &slots[0], &expected),
+            inspect(1, &slots[1], &expected),
+        ];
+        let sequence = |slot: usize| match &contents[slot] {
+            Contents::Whole(image) => Some(image.sequence),
+            _ => None,
+        };
+        let active = match (sequence(0), sequence(1)) {
+            (Some(a), Some(b)) => Some(usize::from(b > a)),
+            (Some(_), None) => Some(0),
+            (None, Some(_)) => Some(1),
+            (None, None) => None,
+        };
+        Self {
+            slots,
+            contents,
+            active,
+            expected,
+            write: None,
+            locked: false,
+        }
+    }
+
+    /// The active slot and its image.
+    pub fn active(&self) -> Option<(usize, &Image)> {
+        let slot = self.active?;
+        match &self.contents[slot] {
+            Contents::Whole(image) => Some((slot, image)),
+            _ => None,
+        }
+    }
+
+    /// What slot 0 and slot 1 hold.
+    pub fn contents(&self) -> &[Contents; 2] {
+        &self.contents
+    }
+
+    /// The active image's bytes.
+    pub fn active_bytes(&self) -> Option<&[u8]> {
+        let (slot, image) = self.active()?;
+        self.slots[slot].mapped().get(..image.checked.length)
+    }
+
+    /// The map of the active image, a view into its flash; no check beyond a few comparisons.
+    pub fn map<const Q: usize, const H: usize, const X: usize>(
+        &self,
+    ) -> Option<hae::Map<'_, Q, H, X>> {
+        let (slot, image) = self.active()?;
+        hae::Map::view(self.slots[slot].mapped(), &image.checked)
+    }
+
+    /// What an image must be to be taken.
+    pub fn expected(&self) -> &Expected {
+        &self.expected
+    }
+
+    /// Most bytes an image may have.
+    pub fn capacity(&self) -> usize {
+        self.slots
+            .iter()
+            .map(|slot| slot.capacity().saturating_sub(F::ERASE_SIZE))
+            .min()
+            .unwrap_or(0)
+    }
+
+    /// Bytes taken and bytes announced of the image being written; a host resumes from here.
+    pub fn progress(&self) -> Option<(usize, usize)> {
+        self.write
+            .as_ref()
+            .map(|write| (write.taken(), write.length))
+    }
+
+    /// The slots, to look into.
+    pub fn slots(&self) -> &[F; 2] {
+        &self.slots
+    }
+
+    /// Gives the flash back.
+    pub fn release(self) -> [F; 2] {
+        self.slots
+    }
+
+    /// While locked, everything that writes is refused: the clutch is closed.
+    pub(crate) fn set_locked(&mut self, locked: bool) {
+        self.locked = locked;
+    }
+
+    /// Begins an image of `length` bytes in the slot that is not active. What was begun before is given up.
+    pub fn begin(&mut self, length: usize) -> Result<(), Error> {
+        self.check_unlocked()?;
+        self.write = None;
+        let slot = self.active.map_or(0, |active| 1 - active);
+        self.check_geometry(slot)?;
+        let capacity = self.capacity();
+        if length > capacity {
+            return Err(Error::TooLong { length, capacity });
+        }
+        self.contents[slot] = Contents::Empty;
+        let (start, end) = records(&self.slots[slot]);
+        self.erase(slot, start, end)?;
+        self.write = Some(Write {
+            slot,
+            length,
+            programmed: 0,
+            page: [0xFF; PAGE],
+            filled: 0,
+        });
+        Ok(())
+    }
+
+    /// Takes the bytes from `offset` on. A chunk that came before, whole or in part, may come again: its known part is
+    /// passed over. An error of the flash gives up the image.
+    pub fn chunk(&mut self, offset: usize, bytes: &[u8]) -> Result<(), Error> {
+        self.check_unlocked()?;
+        let write = self.write.as_ref().ok_or(Error::NotBegun)?;
+        let (taken, length) = (write.taken(), write.length);
+        let end = offset.saturating_add(bytes.len());
+        if end > length {
+            return Err(Error::Overrun { end, length });
+        }
+        let Some(known) = taken.checked_sub(offset) else {
+            return Err(Error::Offset {
+                found: offset,
+                expected: taken,
+            });
+        };
+        let fresh = bytes.get(known..).unwrap_or_default();
+        let result = self.take(fresh);
+        if result.is_err() {
+            self.write = None;
+        }
+        result
+    }
+
+    /// Makes the image active, after checking all of it. An error gives it up.
+    pub fn commit(&mut self) -> Result<(), Error> {
+        self.check_unlocked()?;
+        let write = self.write.as_ref().ok_or(Error::NotBegun)?;
+        if write.taken() < write.length {
+            return Err(Error::Incomplete {
+                found: write.taken(),
+                expected: write.length,
+            });
+        }
+        let (slot, length) = (write.slot, write.length);
+        let result = self.finish(slot, length);
+        self.write = None;
+        result
+    }
+
+    /// Gives up the image being written. The active one was never touched.
+    pub fn abort(&mut self) {
+        self.write = None;
+    }
+
+    /// Makes the image in `slot` the active one, now and after every restart.
+    pub fn select(&mut self, slot: usize) -> Result<(), Error> {
+        self.check_unlocked()?;
+        if self.write.is_some() {
+            return Err(Error::Busy);
+        }
+        let Contents::Whole(image) = *self.contents.get(slot).ok_or(Error::NoSlot { slot })? else {
+            return Err(Error::NoImage { slot });
+        };
+        if self.active == Some(slot) {
+            return Ok(());
+        }
+        let (start, end) = records(&self.slots[slot]);
+        let free = (start..end)
+            .step_by(stride::<F>())
+            .find(|&at| is_erased(self.slots[slot].mapped().get(at..at + stride::<F>())))
+            .ok_or(Error::RecordsFull { slot })?;
+        self.record(slot, free, image.checked)
+    }
+}
+
+impl<F: Slot> WeightsStore<F> {
+    fn check_unlocked(&self) -> Result<(), Error> {
+        if self.locked {
+            Err(Error::Engaged)
+        } else {
+            Ok(())
+        }
+    }
+
+    fn check_geometry(&self, slot: usize) -> Result<(), Error> {
+        if fits(&self.slots[slot]) {
+            Ok(())
+        } else {
+            Err(Error::Geometry {
+                slot,
+                write_size: F::WRITE_SIZE,
+                erase_size: F::ERASE_SIZE,
+                capacity: self.slots[slot].capacity(),
+            })
+        }
+    }
+
+    /// Collects bytes into pages and programs full ones.
+    fn take(&mut self, mut bytes: &[u8]) -> Result<(), Error> {
+        while !bytes.is_empty() {
+            let write = self.write.as_mut().ok_or(Error::NotBegun)?;
+            let (now, rest) = bytes.split_at(bytes.len().min(PAGE - write.filled));
+            write.page[write.filled..write.filled + now.len()].copy_from_slice(now);
+            write.filled += now.len();
+            bytes = rest;
+            if write.filled == PAGE {
+                self.program_page()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Programs the page buffer, erasing the block first when it begins one.
+    fn program_page(&mut self) -> Result<(), Error> {
+        let write = self.write.as_ref().ok_or(Error::NotBegun)?;
+        let (slot, at, page, filled) = (write.slot, write.programmed, write.page, write.filled);
+        let padded = filled.next_multiple_of(F::WRITE_SIZE);
+        let first = at.next_multiple_of(F::ERASE_SIZE);
+        for block in (first..at + padded).step_by(F::ERASE_SIZE) {
+            self.erase(slot, block, block + F::ERASE_SIZE)?;
+        }
+        self.program(slot, at, &page[..padded])?;
+        if let Some(write) = &mut self.write {
+            write.programmed += filled;
+            write.filled = 0;
+            write.page = [0xFF; PAGE];
+        }
+        Ok(())
+    }
+
+    fn finish(&mut self, slot: usize, length: usize) -> Result<(), Error> {
+        if self.write.as_ref().is_some_and(|write| write.filled > 0) {
+            self.program_page()?;
+        }
+        let checked = check(self.slots[slot].mapped(), &self.expected)?;
+        if checked.length != length {
+            return Err(Error::Length {
+                found: checked.length,
+                expected: length,
+            });
+        }
+        if let Some((_, active)) = self.active()
+            && checked.meta.version < active.checked.meta.version
+        {
+            return Err(Error::Older {
+                found: checked.meta.version,
+                active: active.checked.meta.version,
+            });
+        }
+        let (start, _) = records(&self.slots[slot]);
+        self.record(slot, start, checked)
+    }
+
+    /// Programs a record for the image in `slot` and makes it active.
+    fn record(&mut self, slot: usize, at: usize, checked: Checked) -> Result<(), Error> {
+        // Above every record there is, those of damaged images included.
+        let newest = self
+            .slots
+            .iter()
+            .filter_map(newest_record)
+            .map(|record| record.sequence);
+        let sequence = newest
+            .max()
+            .unwrap_or(0)
+            .checked_add(1)
+            .ok_or(Error::RecordsFull { slot })?;
+        let record = Record {
+            sequence,
+            length: checked.length as u32,
+            crc: checked.crc,
+        };
+        let mut unit = [0xFF; PAGE];
+        unit[..record::LEN].copy_from_slice(&record.emit());
+        self.program(slot, at, &unit[..stride::<F>()])?;
+        self.contents[slot] = Contents::Whole(Image { checked, sequence });
+        self.active = Some(slot);
+        Ok(())
+    }
+
+    fn erase(&mut self, slot: usize, from: usize, to: usize) -> Result<(), Error> {
+        let flash = |error: F::Error| Error::Flash {
+            slot,
+            offset: from,
+            kind: error.kind(),
+        };
+        self.slots[slot]
+            .erase(from as u32, to as u32)
+            .map_err(flash)?;
+        if is_erased(self.slots[slot].mapped().get(from..to)) {
+            Ok(())
+        } else {
+            Err(Error::ReadBack { slot, offset: from })
+        }
+    }
+
+    fn program(&mut self, slot: usize, at: usize, bytes: &[u8]) -> Result<(), Error> {
+        let flash = |error: F::Error| Error::Flash {
+            slot,
+            offset: at,
+            kind: error.kind(),
+        };
+        self.slots[slot].write(at as u32, bytes).map_err(flash)?;
+        if self.slots[slot].mapped().get(at..at + bytes.len()) == Some(bytes) {
+            Ok(())
+        } else {
+            Err(Error::ReadBack { slot, offset: at })
+        }
+    }
+}
+
+/// Whether the store can work with this flash.
+fn fits<F: Slot>(slot: &F) -> bool {
+    let (unit, block, capacity) = (F::WRITE_SIZE, F::ERASE_SIZE, slot.capacity());
+    unit.is_power_of_two()
+        && unit <= PAGE
+        && block >= stride::<F>()
+        && block.is_multiple_of(stride::<F>())
+        && capacity >= 2 * block
+        && capacity.is_multiple_of(block)
+        && u32::try_from(capacity).is_ok()
+        && slot.mapped().len() >= capacity
+}
+
+/// Distance between records: each has a program unit of its own.
+const fn stride<F: Slot>() -> usize {
+    if F::WRITE_SIZE > record::LEN {
+        F::WRITE_SIZE
+    } else {
+        record::LEN
+    }
+}
+
+/// Start and end of the records: the slot's last erase block.
+fn records<F: Slot>(slot: &F) -> (usize, usize) {
+    let end = slot.capacity();
+    (end.saturating_sub(F::ERASE_SIZE), end)
+}
+
+fn is_erased(bytes: Option<&[u8]>) -> bool {
+    bytes.is_some_and(|bytes| bytes.iter().all(|&byte| byte == 0xFF))
+}
+
+/// The full check of an image at the start of `bytes`.
+fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, Error> {
+    let checked = image::parse(bytes).map_err(Error::Image)?;
+    let found = [checked.inputs, checked.hidden, checked.outputs];
+    if found != expected.shape {
+        return Err(Error::Shape {
+            found,
+            expected: expected.shape,
+        });
+    }
+    if checked.meta.joint_order != expected.joint_order {
+        return Err(Error::JointOrder {
+            found: checked.meta.joint_order,
+            expected: expected.joint_order,
+        });
+    }
+    Ok(checked)
+}
+
+/// The slot's valid record with the highest sequence.
+fn newest_record<F: Slot>(slot: &F) -> Option<Record> {
+    if !fits(slot) {
+        return None;
+    }
+    let (start, end) = records(slot);
+    (start..end)
+        .step_by(stride::<F>())
+        .filter_map(|at| Record::parse(slot.mapped().get(at..at + record::LEN)?))
+        .max_by_key(|record| record.sequence)
+}
+
+/// What a slot holds.
+fn inspect<F: Slot>(index: usize, slot: &F, expected: &Expected) -> Contents {
+    let Some(record) = newest_record(slot) else {
+        return Contents::Empty;
+    };
+    let (start, _) = records(slot);
+    // The records are no part of an image.
+    match check(slot.mapped().get(..start).unwrap_or_default(), expected) {
+        Ok(checked) if checked.length as u32 == record.length && checked.crc == record.crc => {
+            Contents::Whole(Image {
+                checked,
+                sequence: record.sequence,
+            })
+        }
+        Ok(_) => Contents::Damaged(Error::NoImage { slot: index }),
+        Err(error) => Contents::Damaged(error),
+    }
+}

@@ -1,0 +1,139 @@
+//! What every command must keep: lead, rate, configuration space.
+//!
+//! The configuration space of the 3-Finger gripper is not convex: it forbids a scissor that is far closed *while* two
+//! fingers are far closed. Each of two commands may be allowed and the way between them not, and the axes are not
+//! equally fast. But what is forbidden stays forbidden when any axis closes further (the allowed set is a lower set). So
+//! it is enough that the *corner*, axis by axis the greater of command and measured position, is allowed: then every
+//! position the gripper can be in on its way is allowed too, in whatever order its axes arrive.
+
+use gripper::{Contact, space};
+
+/// Distance kept from the edge of the configuration space, in counts, so that a measured position that ends a count
+/// beyond its command is still inside.
+const MARGIN: f32 = 2.0;
+
+/// Whether an axis has stopped against something (gDTx 1 or 2).
+pub fn touches(contact: Contact) -> bool {
+    matches!(contact, Contact::ContactOpening | Contact::ContactClosing)
+}
+
+/// The nearest allowed position to `target`: within 0 to 255, and for four axes inside the configuration space with
+/// a margin of two counts. `target` must be finite.
+pub fn project<const X: usize>(target: [f32; X]) -> [f32; X] {
+    let boxed = target.map(|x| x.clamp(0.0, 255.0));
+    let Some(four) = four(&boxed) else {
+        return boxed;
+    };
+    let shifted = four.map(|x| (x + MARGIN).min(255.0));
+    if space::contains(&shifted) {
+        return boxed;
+    }
+    let near = space::nearest(&shifted);
+    from_four(
+        core::array::from_fn(|axis| (near[axis] - MARGIN).clamp(0.0, 255.0)),
+        boxed,
+    )
+}
+
+/// One axis: at most `step` counts from `before`, at most `lead` from `measured`, within 0 to 255. Lead comes last: it
+/// holds whatever the others want.
+pub fn approach(desired: f32, before: f32, step: f32, measured: u8, lead: u8) -> f32 {
+    let measured = f32::from(measured);
+    let lead = f32::from(lead);
+    desired
+        .clamp(before - step, before + step)
+        .clamp(measured - lead, measured + lead)
+        .clamp(0.0, 255.0)
+}
+
+/// Rounds to counts; a NaN, which cannot come here, would become the measured position.
+pub fn round(x: f32, measured: u8) -> u8 {
+    if x.is_nan() {
+        return measured;
+    }
+    libm::roundf(x).clamp(0.0, 255.0) as u8
+}
+
+/// Whether a position is allowed.
+pub fn inside<const X: usize>(position: &[u8; X]) -> bool {
+    match four(&position.map(f32::from)) {
+        Some(four) => space::contains(&four),
+        None => true,
+    }
+}
+
+/// `command`, changed where needed so that the gripper stays inside the configuration space on its way from `measured`,
+/// in whatever order its axes arrive. Axes only ever move towards `measured`, so a lead that was kept stays kept.
+///
+/// A gripper that is outside (someone put it there) may only open, axis by axis, until it is inside.
+pub fn keep_inside<const X: usize>(
+    command: [u8; X],
+    measured: &[u8; X],
+    target: &[f32; X],
+) -> [u8; X] {
+    if inside(&corner(&command, measured)) {
+        return command;
+    }
+    if !inside(measured) {
+        return core::array::from_fn(|axis| command[axis].min(measured[axis]));
+    }
+    match (
+        cap_scissor(command, measured),
+        cap_fingers(command, measured),
+    ) {
+        (Some(a), Some(b)) if distance(&b, target) < distance(&a, target) => b,
+        (Some(a), _) => a,
+        (None, Some(b)) => b,
+        (None, None) => *measured,
+    }
+}
+
+/// Axis by axis the greater one.
+fn corner<const X: usize>(a: &[u8; X], b: &[u8; X]) -> [u8; X] {
+    core::array::from_fn(|axis| a[axis].max(b[axis]))
+}
+
+/// Lets the scissor, the last axis, close only as far as the fingers' corner allows.
+fn cap_scissor<const X: usize>(mut command: [u8; X], measured: &[u8; X]) -> Option<[u8; X]> {
+    let last = X.checked_sub(1)?;
+    let (wanted, here) = (command[last], measured[last]);
+    for scissor in (here..wanted).rev() {
+        command[last] = scissor;
+        if inside(&corner(&command, measured)) {
+            return Some(command);
+        }
+    }
+    None
+}
+
+/// Lets the fingers close only as far as the scissor's corner allows, all by the same share of their way.
+fn cap_fingers<const X: usize>(command: [u8; X], measured: &[u8; X]) -> Option<[u8; X]> {
+    const PARTS: u16 = 40;
+    (0..PARTS).rev().find_map(|part| {
+        let mut capped = command;
+        for axis in 0..X.saturating_sub(1) {
+            let rise = u16::from(command[axis].saturating_sub(measured[axis]));
+            if rise > 0 {
+                // At most `rise`, which is at most 255.
+                capped[axis] = measured[axis].saturating_add((rise * part / PARTS) as u8);
+            }
+        }
+        inside(&corner(&capped, measured)).then_some(capped)
+    })
+}
+
+fn distance<const X: usize>(a: &[u8; X], b: &[f32; X]) -> f32 {
+    a.iter()
+        .zip(b)
+        .map(|(&a, &b)| libm::fabsf(f32::from(a) - b))
+        .sum()
+}
+
+/// The axes of a 3-Finger gripper, or `None` for another number of axes.
+fn four<const X: usize>(x: &[f32; X]) -> Option<[f32; 4]> {
+    x.as_slice().try_into().ok()
+}
+
+fn from_four<const X: usize>(x: [f32; 4], or: [f32; X]) -> [f32; X] {
+    x.as_slice().try_into().unwrap_or(or)
+}

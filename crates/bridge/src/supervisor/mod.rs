@@ -1,0 +1,288 @@
+//! The supervisor: decides, every 10 ms, what the gripper is told.
+//!
+//! [`Supervisor::step`] takes the time and everything it needs as arguments, does no I/O and reads no clock: the same
+//! inputs give the same commands on every machine. `docs/safety.md` says which rule it keeps, where and how it is tested.
+
+mod command;
+mod hand;
+pub mod limits;
+pub mod state;
+
+pub use hand::Hand;
+pub use state::{Clutch, Conditions, GripperFault, HoldReason, State};
+
+use crate::config::Config;
+use crate::{Duration, Instant, timing};
+use gripper::registers::Fault;
+use gripper::{Activation, Motion, Status};
+use hand::{Follower, Used, is_fresh};
+
+/// Whether there is a map to follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// An image is in place.
+    Ready,
+    /// The store holds no image.
+    Missing,
+    /// An image is being written.
+    Busy,
+}
+
+/// Everything a step looks at.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Inputs<const X: usize> {
+    /// When the clutch's newest heartbeat came; `None` when the person opened the clutch or never closed it.
+    pub heartbeat: Option<Instant>,
+    /// The newest frame; the same one may be given again.
+    pub hand: Option<Hand<X>>,
+    /// The gripper's newest status; the same one may be given again.
+    pub status: Option<Status<X>>,
+    /// The map.
+    pub weights: Weights,
+}
+
+/// What a step decides.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Output<const X: usize> {
+    /// The state after the step.
+    pub state: State,
+    /// The state before it.
+    pub before: State,
+    /// What the gripper is told; `None`: nothing is written, its status is read.
+    pub motion: Option<Motion<X>>,
+    /// Stamp of the oldest sample `motion` rests on; without a motion, the time of the step.
+    pub stamp: Instant,
+    /// Where the hand wants the gripper, counts: filtered, inside the configuration space.
+    pub target: Option<[f32; X]>,
+    /// How much later than its period the step came, when that is more than 2 ms.
+    pub late: Option<Duration>,
+}
+
+/// Decides what the gripper is told. `X` is its number of axes.
+#[derive(Debug, Clone)]
+pub struct Supervisor<const X: usize> {
+    config: Config<X>,
+    state: State,
+    stepped: Option<Instant>,
+    follower: Follower<X>,
+    /// Commanded position before rounding.
+    position: [f32; X],
+    /// What a hold repeats, once taken.
+    held: Option<[u8; X]>,
+    /// A command has been written since the gripper became ready.
+    commanded: bool,
+    /// Motion has begun under this clutch.
+    moved: bool,
+    held_since: Option<Instant>,
+    blend: Blend<X>,
+    was_ready: bool,
+    ignored_since: Option<Instant>,
+}
+
+/// Where and when following began.
+#[derive(Debug, Clone, Copy)]
+struct Blend<const X: usize> {
+    from: [f32; X],
+    since: Instant,
+}
+
+impl<const X: usize> Supervisor<X> {
+    /// A supervisor that has seen nothing: idle.
+    pub fn new(config: Config<X>) -> Self {
+        Self {
+            follower: Follower::new(config.settings().filter),
+            config,
+            state: State::Idle,
+            stepped: None,
+            position: [0.0; X],
+            held: None,
+            commanded: false,
+            moved: false,
+            held_since: None,
+            blend: Blend {
+                from: [0.0; X],
+                since: Instant::from_ticks(0),
+            },
+            was_ready: false,
+            ignored_since: None,
+        }
+    }
+
+    /// The state after the newest step.
+    pub fn state(&self) -> State {
+        self.state
+    }
+
+    /// The configuration.
+    pub fn config(&self) -> &Config<X> {
+        &self.config
+    }
+
+    /// One step. Call it every 10 ms, and whenever a new frame should be answered at once.
+    pub fn step(&mut self, now: Instant, inputs: &Inputs<X>) -> Output<X> {
+        let gap = self.elapse(now);
+        if gap.is_none() {
+            self.follower.forget();
+        }
+        if let Some(hand) = &inputs.hand {
+            self.follower.accept(now, hand);
+        }
+        let status = inputs.status.filter(|status| is_fresh(now, status.stamp));
+        let (conditions, used) = self.conditions(now, inputs, status.as_ref(), gap.is_none());
+        let before = self.state;
+        self.state = state::next(before, &conditions);
+        self.enter(now, before, status.as_ref());
+        let (motion, stamp) = self.motion(
+            now,
+            gap.unwrap_or(Duration::from_ticks(0)),
+            status.as_ref(),
+            used,
+        );
+        Output {
+            state: self.state,
+            before,
+            motion,
+            stamp,
+            target: self.follower.target(),
+            late: gap.and_then(lateness),
+        }
+    }
+}
+
+impl<const X: usize> Supervisor<X> {
+    /// Time since the step before: `None` when it cannot be taken as one stretch (a stall, or a clock that ran backwards).
+    fn elapse(&mut self, now: Instant) -> Option<Duration> {
+        let before = self.stepped.replace(now).unwrap_or(now);
+        now.checked_duration_since(before)
+            .filter(|gap| *gap <= timing::LONGEST_GAP)
+    }
+
+    /// Everything that decides the next state, and the frame to follow if there is one.
+    fn conditions(
+        &mut self,
+        now: Instant,
+        inputs: &Inputs<X>,
+        status: Option<&Status<X>>,
+        stalled: bool,
+    ) -> (Conditions, Option<Used<X>>) {
+        let fault = self.gripper_fault(now, status);
+        let wanted = if self.state.is_moving() {
+            0
+        } else {
+            self.config.settings().fresh_frames
+        };
+        let follow = self.follower.follow(now, wanted);
+        let gripper = match status.map(|status| status.activation) {
+            None => Some(HoldReason::GripperSilent),
+            Some(Activation::Ready) => None,
+            Some(other) => Some(HoldReason::GripperNotReady(other)),
+        };
+        let weights = match inputs.weights {
+            Weights::Ready => None,
+            Weights::Missing => Some(HoldReason::NoWeights),
+            Weights::Busy => Some(HoldReason::StoreBusy),
+        };
+        let stall = stalled.then_some(HoldReason::ClockGap);
+        let conditions = Conditions {
+            clutch: clutch(now, inputs.heartbeat),
+            fault,
+            obstacle: gripper.or(stall).or(weights).or(follow.err()),
+            blended: since(now, self.blend.since) >= self.blend_time(),
+            held_long: self.moved
+                && self
+                    .held_since
+                    .is_some_and(|start| since(now, start) >= timing::SAFE_AFTER),
+        };
+        (conditions, follow.ok())
+    }
+
+    /// A fault of the gripper at this moment. Whether it *lost* its activation is judged from the clutch's closing on.
+    fn gripper_fault(&mut self, now: Instant, status: Option<&Status<X>>) -> Option<GripperFault> {
+        let status = status?;
+        let ready = status.activation == Activation::Ready;
+        self.was_ready = ready || (self.was_ready && self.state != State::Idle);
+        if !self.state.is_moving() || status.going_to {
+            self.ignored_since = None;
+        }
+        if status.fault != Fault::None {
+            Some(GripperFault::Reported(status.fault))
+        } else if self.was_ready
+            && matches!(
+                status.activation,
+                Activation::Reset | Activation::Activating
+            )
+        {
+            Some(GripperFault::ActivationLost(status.activation))
+        } else if self.state.is_moving() && !status.going_to {
+            let start = *self.ignored_since.get_or_insert(now);
+            (since(now, start) >= timing::IGNORED_AFTER).then_some(GripperFault::CommandIgnored)
+        } else {
+            None
+        }
+    }
+
+    /// What a change of state sets up.
+    fn enter(&mut self, now: Instant, before: State, status: Option<&Status<X>>) {
+        if self.state.is_moving() {
+            if !before.is_moving() {
+                self.begin(now, status);
+            }
+            return;
+        }
+        if before.is_moving() {
+            self.held_since = Some(now);
+        }
+        let opened =
+            matches!(before, State::SafeAction(_)) && !matches!(self.state, State::SafeAction(_));
+        if before.is_moving() || opened {
+            self.held = None;
+        }
+        if self.state == State::Idle {
+            self.moved = false;
+            self.held_since = None;
+        }
+    }
+
+    /// Following begins where the gripper is.
+    fn begin(&mut self, now: Instant, status: Option<&Status<X>>) {
+        if let Some(status) = status {
+            self.position = status.hold().map(f32::from);
+        }
+        self.blend = Blend {
+            from: self.position,
+            since: now,
+        };
+        self.moved = true;
+        self.held_since = None;
+        self.ignored_since = None;
+    }
+
+    fn blend_time(&self) -> Duration {
+        Duration::from_ticks(1_000 * u64::from(self.config.settings().blend_ms))
+    }
+}
+
+/// The clutch by its heartbeat. A heartbeat from the future is none.
+fn clutch(now: Instant, heartbeat: Option<Instant>) -> Clutch {
+    match heartbeat {
+        None => Clutch::Open,
+        Some(beat) => match now.checked_duration_since(beat) {
+            Some(age) if age < timing::HEARTBEAT_TIMEOUT => Clutch::Closed,
+            _ => Clutch::Lost,
+        },
+    }
+}
+
+fn since(now: Instant, then: Instant) -> Duration {
+    now.checked_duration_since(then)
+        .unwrap_or(Duration::from_ticks(0))
+}
+
+fn seconds(duration: Duration) -> f32 {
+    duration.as_micros() as f32 * 1e-6
+}
+
+fn lateness(gap: Duration) -> Option<Duration> {
+    gap.checked_sub(timing::PERIOD)
+        .filter(|late| *late > timing::LATE)
+}

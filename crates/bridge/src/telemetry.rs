@@ -1,0 +1,163 @@
+//! What the bridge knows at the end of a step, in one plain struct.
+
+use crate::posture::{self, Reading};
+use crate::{Duration, HoldReason, Instant, State};
+use glove::hand::JOINT_COUNT;
+use glove::scan::{self, Frame};
+use gripper::{Motion, Status};
+
+/// A snapshot after one step of the loop. `X` is the gripper's number of axes.
+///
+/// A step takes at most one frame, sends at most one command and takes at most one status. Whoever looks after every step
+/// and compares the three sequence numbers sees each exactly once.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Telemetry<const X: usize> {
+    /// Time of the step.
+    pub now: Instant,
+    /// State of the supervisor.
+    pub state: State,
+    /// Counts frames taken; 0: none yet. Wraps, like the other two.
+    pub frame_sequence: u32,
+    /// The newest frame.
+    pub frame: Option<Frame>,
+    /// Joint angles of the newest frame that gave any, radians; joints beside a lost sensor repeat their last good angle.
+    pub angles: [f32; JOINT_COUNT],
+    /// Whether the newest frame gave angles.
+    pub angles_valid: bool,
+    /// Segments without a usable sample in the newest frame (bit k: segment k).
+    pub missing: u16,
+    /// Joints that repeat their last good angle (bit j: joint j).
+    pub held_joints: u32,
+    /// The map's output for `angles`, counts as they come from the map; `None` without map or when it refused.
+    pub map_output: Option<[f32; X]>,
+    /// Where the hand wants the gripper, counts: filtered, inside the configuration space.
+    pub target: Option<[f32; X]>,
+    /// What the gripper is told now; `None`: nothing is written, it is only read.
+    pub command: Option<Motion<X>>,
+    /// Counts commands that left (a request with a command was handed to the port), repeats included; 0: none yet.
+    pub sent_sequence: u32,
+    /// The newest command that left.
+    pub sent: Option<Sent<X>>,
+    /// Counts statuses taken; 0: none yet.
+    pub status_sequence: u32,
+    /// The newest status.
+    pub status: Option<Status<X>>,
+    /// Of the newest command that left and followed the hand: from the stamp of the oldest sample used to its leaving.
+    pub latency: Option<Duration>,
+    /// Whether frames come from the glove (at least one in 500 ms).
+    pub glove_answers: bool,
+    /// Whether the gripper answers (at least once in 500 ms).
+    pub gripper_answers: bool,
+    /// What the scanner is doing.
+    pub glove_state: scan::State,
+    /// Counters.
+    pub counters: Counters,
+}
+
+/// A command that left for the gripper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sent<const X: usize> {
+    /// What it said.
+    pub motion: Motion<X>,
+    /// Stamp of the oldest sample it rests on.
+    pub stamp: Instant,
+    /// When the supervisor decided it.
+    pub decided: Instant,
+    /// When it was handed to the port.
+    pub at: Instant,
+    /// Whether it follows the hand; else it holds, or runs the safe action.
+    pub follows: bool,
+}
+
+/// Counts since start; each stops at its greatest value.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Counters {
+    /// The scanner's.
+    pub glove: scan::Counters,
+    /// The gripper link's.
+    pub gripper: gripper::link::Counters,
+    /// Steps of the supervisor.
+    pub steps: u32,
+    /// Steps that came more than 2 ms late.
+    pub late_steps: u32,
+    /// The latest one, microseconds.
+    pub worst_late_us: u32,
+    /// Frames that gave no angles (lost sensors) or were refused by the map.
+    pub unusable_frames: u32,
+    /// Frames that were answered, in the step that took them, with a command that follows the hand.
+    pub answered_frames: u32,
+    /// Cycles of the gripper that ended in an error.
+    pub gripper_errors: u32,
+    /// How often motion was held.
+    pub holds: u32,
+    /// How often the gripper's fault ended motion.
+    pub faults: u32,
+    /// Events that were lost because nobody drained the queue.
+    pub events_lost: u32,
+}
+
+impl<const X: usize> Telemetry<X> {
+    /// Nothing known yet.
+    pub(crate) fn new(now: Instant, glove_state: scan::State) -> Self {
+        Self {
+            now,
+            state: State::Idle,
+            frame_sequence: 0,
+            frame: None,
+            angles: [0.0; JOINT_COUNT],
+            angles_valid: false,
+            missing: 0,
+            held_joints: 0,
+            map_output: None,
+            target: None,
+            command: None,
+            sent_sequence: 0,
+            sent: None,
+            status_sequence: 0,
+            status: None,
+            latency: None,
+            glove_answers: false,
+            gripper_answers: false,
+            glove_state,
+            counters: Counters::default(),
+        }
+    }
+
+    pub(crate) fn take_frame(&mut self, frame: &Frame) {
+        self.frame_sequence = self.frame_sequence.wrapping_add(1);
+        self.frame = Some(*frame);
+        self.missing = posture::missing(frame);
+    }
+
+    pub(crate) fn take_reading(&mut self, reading: &Result<Reading, HoldReason>) {
+        self.angles_valid = reading.is_ok();
+        match reading {
+            Ok(reading) => {
+                self.angles = reading.angles;
+                self.missing = reading.missing;
+                self.held_joints = reading.held;
+            }
+            Err(HoldReason::SensorsLost(missing)) => self.missing = *missing,
+            Err(_) => {}
+        }
+    }
+
+    /// Returns the status before.
+    pub(crate) fn take_status(&mut self, status: Status<X>) -> Option<Status<X>> {
+        self.status_sequence = self.status_sequence.wrapping_add(1);
+        self.status.replace(status)
+    }
+
+    pub(crate) fn take_sent(&mut self, sent: Sent<X>) {
+        self.sent_sequence = self.sent_sequence.wrapping_add(1);
+        if sent.follows {
+            self.latency = sent.at.checked_duration_since(sent.stamp);
+        }
+        self.sent = Some(sent);
+    }
+}
+
+/// Counts one more.
+pub(crate) fn bump(counter: &mut u32) {
+    *counter = counter.saturating_add(1);
+}

@@ -1,0 +1,41 @@
+//! Every time the bridge waits for, and the sum behind it.
+
+use crate::Duration;
+
+/// Period of the supervisor: one step at least this often.
+///
+/// A gripper cycle (FC23 at 115200 baud) takes 7.8 ms, so a step has a new status nearly every time.
+pub const PERIOD: Duration = Duration::from_ticks(10_000);
+
+/// A step may come this much after its due time; a later one is counted and told.
+pub const LATE: Duration = Duration::from_ticks(2_000);
+
+/// Longest time between two steps that the supervisor takes as one stretch of motion. After a longer gap nobody knows
+/// what happened meanwhile: it holds and settles anew.
+pub const LONGEST_GAP: Duration = Duration::from_ticks(100_000);
+
+/// Oldest sample a command may rest on (rule 2): the hand's and the gripper's alike.
+///
+/// A scan at 115200 baud takes 31 ms, so just before the next frame the oldest sample is 62 ms old.
+pub const MAX_AGE: Duration = Duration::from_ticks(100_000);
+
+/// The host sends the clutch's heartbeat this often.
+pub const HEARTBEAT: Duration = Duration::from_ticks(100_000);
+
+/// Without a heartbeat for this long the clutch is open: two may be lost, with half a period to spare.
+pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_ticks(250_000);
+
+/// Motion that has been held for this long gives way to the configured safe action.
+pub const SAFE_AFTER: Duration = Duration::from_ticks(500_000);
+
+/// A gripper that is written to for this long and does not report gGTO is not following.
+pub const IGNORED_AFTER: Duration = Duration::from_ticks(500_000);
+
+/// Longest time one step of the loop may take, whatever the devices do.
+pub const STEP_BUDGET: Duration = Duration::from_ticks(1_000);
+
+/// A device that has said nothing for this long is told to be silent. (Motion ended long before, after [`MAX_AGE`].)
+pub const SILENT: Duration = Duration::from_ticks(500_000);
+
+/// A calibration waits this long for a complete frame.
+pub const CALIBRATION_WAIT: Duration = Duration::from_ticks(2_000_000);
