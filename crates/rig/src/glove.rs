@@ -1,34 +1,60 @@
 //! The virtual glove: SC18IM serial-to-I2C bridge, TCA9548A multiplexer, 16 BNO055 (hardware.md §3, §4).
+//!
+//! Sensor `s` sits on segment `s` of the hand, on multiplexer channel `s / 2`, at address 0x28 where
+//! `s` is even and 0x29 where it is odd.
+
+mod bno055;
+mod bus;
+mod faults;
+mod sc18im;
 
 use std::sync::{Arc, Mutex};
 
-pub use ::glove::hand::Side;
+use nalgebra::{Quaternion, UnitQuaternion};
+use rand::{Rng, SeedableRng};
+use rand_chacha::ChaCha8Rng;
 
+pub use ::glove::hand::Side;
+pub use bno055::{BOOT, ENTER_CONFIG, FUSION_PERIOD, LEAVE_CONFIG};
+pub use faults::Counters;
+pub use sc18im::{Chip, IDLE_TIMEOUT, MAX_DATA};
+
+use crate::clock::lock;
 use crate::{Device, Instant, PoseSource};
+use bus::Bus;
+use sc18im::Sc18im;
 
 /// How the virtual glove is built.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// The UART's rate at the start: 9,600 after a reset, any other as if a program had set it before.
+    /// The UART's rate at the start. 9,600 is a chip fresh from reset, which says `OK`; any other is
+    /// a chip that some program has set up before.
     pub baud: u32,
+    /// Which serial-to-I2C bridge.
+    pub chip: Chip,
     /// Which hand wears it.
     pub side: Side,
-    /// Seed of the ±1 LSB dither on every sensor's quaternion; `None` gives exact, bit-frozen samples.
+    /// Seed of the ±1 LSB dither on every component of every sample, which keeps a still hand from
+    /// giving the same bits for ever; `None` for exact samples.
     pub dither: Option<u64>,
     /// The hand's own orientation in the world, w x y z.
     pub world: [f32; 4],
     /// How each sensor sits on its segment, w x y z: it reports world · segment · mounting.
     pub mounting: [[f32; 4]; 16],
+    /// When it was powered on: the sensors answer 650 ms later.
+    pub power_on: Instant,
 }
 
 impl Default for Config {
     fn default() -> Self {
         Self {
             baud: 9_600,
+            chip: Chip::Sc18im700,
             side: Side::Right,
             dither: Some(1),
             world: [1.0, 0.0, 0.0, 0.0],
             mounting: [[1.0, 0.0, 0.0, 0.0]; 16],
+            power_on: Instant::from_ticks(0),
         }
     }
 }
@@ -47,32 +73,98 @@ impl Config {
 /// The glove as a serial device. Clones share one glove: keep one for its faults and its registers.
 #[derive(Clone)]
 pub struct VirtualGlove {
-    pose: Arc<Mutex<Box<dyn PoseSource>>>,
-    config: Config,
+    state: Arc<Mutex<State>>,
+}
+
+struct State {
+    bridge: Sc18im,
+    bus: Bus,
+    hand: Hand,
+}
+
+/// The moving hand with the sensors fixed to it.
+struct Hand {
+    pose: Box<dyn PoseSource>,
+    side: Side,
+    world: UnitQuaternion<f32>,
+    mounting: [UnitQuaternion<f32>; 16],
+    dither: Option<u64>,
+}
+
+fn unit([w, x, y, z]: [f32; 4]) -> UnitQuaternion<f32> {
+    let q = Quaternion::new(w, x, y, z);
+    UnitQuaternion::try_new(q, 1e-6).unwrap_or_else(UnitQuaternion::identity)
+}
+
+impl Hand {
+    /// What sensor `index` measures at `at`: w, x, y, z.
+    fn orientation(&mut self, index: usize, at: Instant) -> [f32; 4] {
+        let angles = self.pose.pose_at(at.as_ticks() as f64 * 1e-6);
+        let segments = ::glove::hand::segment_orientations(&angles, self.side);
+        let q = self.world * segments[index] * self.mounting[index];
+        let mut components = [q.w, q.i, q.j, q.k];
+        if let Some(seed) = self.dither {
+            let stream = (at.as_ticks() << 4) | index as u64;
+            let mut rng =
+                ChaCha8Rng::seed_from_u64(seed ^ stream.wrapping_mul(0x9E37_79B9_7F4A_7C15));
+            for (component, byte) in components.iter_mut().zip(rng.next_u32().to_le_bytes()) {
+                *component += f32::from(i16::from(byte % 3) - 1) / 16_384.0;
+            }
+        }
+        components
+    }
 }
 
 impl VirtualGlove {
-    /// A glove on the hand that `pose` moves, powered on at the first moment it is touched.
+    /// A glove on the hand that `pose` moves.
     #[must_use]
     pub fn new(pose: Box<dyn PoseSource>, config: Config) -> Self {
+        let hand = Hand {
+            pose,
+            side: config.side,
+            world: unit(config.world),
+            mounting: config.mounting.map(unit),
+            dither: config.dither,
+        };
+        let state = State {
+            bridge: Sc18im::new(config.chip, config.baud, config.power_on),
+            bus: Bus::new(config.power_on),
+            hand,
+        };
         Self {
-            pose: Arc::new(Mutex::new(pose)),
-            config,
+            state: Arc::new(Mutex::new(state)),
         }
+    }
+
+    /// Calls `act` with the chip, the bus and the source of orientations.
+    fn with<T>(&self, act: impl FnOnce(&mut Sc18im, &mut Bus, bus::Orientation<'_>) -> T) -> T {
+        let mut state = lock(&self.state);
+        let State { bridge, bus, hand } = &mut *state;
+        act(bridge, bus, &mut |index, at| hand.orientation(index, at))
     }
 }
 
 impl Device for VirtualGlove {
-    fn receive(&mut self, _bytes: &[u8], _now: Instant) {
-        let _ = &self.pose;
+    fn receive(&mut self, bytes: &[u8], now: Instant) {
+        self.with(|bridge, bus, orientation| {
+            for byte in bytes {
+                bridge.receive(*byte, now, bus, orientation);
+            }
+        });
     }
-    fn transmit(&mut self, _now: Instant, _out: &mut [u8]) -> usize {
-        0
+
+    fn transmit(&mut self, now: Instant, out: &mut [u8]) -> usize {
+        self.with(|bridge, bus, orientation| {
+            bridge.proceed(now, bus, orientation);
+            bridge.transmit(out)
+        })
     }
+
     fn next_due(&self) -> Option<Instant> {
-        None
+        lock(&self.state).bridge.next_due()
     }
+
     fn baud(&self) -> u32 {
-        self.config.baud
+        lock(&self.state).bridge.baud()
     }
 }

@@ -1,0 +1,140 @@
+//! What a test may do to the glove, and what it may look at.
+
+use super::VirtualGlove;
+use crate::clock::lock;
+use crate::{Duration, Instant, PoseSource};
+
+/// Counters of the virtual glove.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counters {
+    /// Messages that went onto the I2C bus.
+    pub transactions: u64,
+    /// Of these, the ones nobody acknowledged.
+    pub nacks: u64,
+    /// Bytes lost because they came while the bus was busy and the FIFO full.
+    pub overflows: u64,
+    /// Messages with more than 16 data bytes, which did nothing.
+    pub refusals: u64,
+}
+
+/// Faults and truth. Sensors are numbered as the segments, 0 to 15; another number does nothing.
+impl VirtualGlove {
+    /// Takes sensor `index` off the bus (every access is a NACK), or puts it back as it was.
+    pub fn unplug(&self, index: usize, unplugged: bool) {
+        self.sensor(index, |chip| chip.faults.unplugged = unplugged);
+    }
+
+    /// Sensor `index` resets at `now` and boots for 650 ms, in CONFIG mode after that.
+    pub fn reset_sensor(&self, index: usize, now: Instant) {
+        self.sensor(index, |chip| chip.reset_and_boot(now));
+    }
+
+    /// Sensor `index` resets just before its next read, so that this one starts at register 0
+    /// (A0 FB 32 0F …); it answers at once, in CONFIG mode.
+    pub fn reset_in_read(&self, index: usize) {
+        self.sensor(index, |chip| chip.faults.reset_in_read = true);
+    }
+
+    /// Flips bit 15 of quaternion `component` (0 w to 3 z) in the next `reads` reads of sensor `index`.
+    pub fn flip_bit15(&self, index: usize, component: usize, reads: u32) {
+        self.sensor(index, |chip| chip.faults.flip = Some((component, reads)));
+    }
+
+    /// Stops the output of sensor `index`: it repeats its last sample.
+    pub fn freeze(&self, index: usize, frozen: bool) {
+        self.sensor(index, |chip| chip.faults.frozen = frozen);
+    }
+
+    /// The next `count` accesses of sensor `index` are not acknowledged.
+    pub fn nack(&self, index: usize, count: u32) {
+        self.sensor(index, |chip| chip.faults.nacks = count);
+    }
+
+    /// Sensor `index` stretches the clock by `per_byte` on every data byte.
+    pub fn stretch(&self, index: usize, per_byte: Duration) {
+        self.sensor(index, |chip| chip.faults.stretch = Some(per_byte));
+    }
+
+    /// A line of the I2C bus is stuck low: messages end by the bridge's timeout, if it is enabled, else
+    /// not before the bus is free again.
+    pub fn dead_bus(&self, dead: bool) {
+        lock(&self.state).bus.dead = dead;
+    }
+
+    /// Takes the multiplexer, and with it all sensors, off the bus.
+    pub fn unplug_mux(&self, unplugged: bool) {
+        lock(&self.state).bus.mux_unplugged = unplugged;
+    }
+
+    /// Resets the multiplexer: no channel is connected.
+    pub fn reset_mux(&self) {
+        lock(&self.state).bus.channels = 0;
+    }
+
+    /// Resets the serial bridge at `now`: 9,600 baud, `OK`.
+    pub fn reset_bridge(&self, now: Instant) {
+        lock(&self.state).bridge.reset(now);
+    }
+
+    /// Cuts the next `count` answers to `bytes` bytes.
+    pub fn cut_answers(&self, bytes: usize, count: u32) {
+        lock(&self.state).bridge.short_answers = (bytes, count);
+    }
+
+    /// Puts another source of poses in place.
+    pub fn set_pose(&self, pose: Box<dyn PoseSource>) {
+        lock(&self.state).hand.pose = pose;
+    }
+
+    /// What sensor `index` would measure at `at`, before rounding, w x y z.
+    #[must_use]
+    pub fn true_orientation(&self, index: usize, at: Instant) -> [f32; 4] {
+        let mut state = lock(&self.state);
+        let dither = state.hand.dither.take();
+        let orientation = state.hand.orientation(index.min(15), at);
+        state.hand.dither = dither;
+        orientation
+    }
+
+    /// A register of sensor `index` as a read would show it, without touching the chip's pointer.
+    #[must_use]
+    pub fn sensor_register(&self, index: usize, page: usize, address: u8) -> u8 {
+        lock(&self.state).bus.sensors[index.min(15)].register(page, address)
+    }
+
+    /// Operation mode of sensor `index`: 0 CONFIG, 8 IMU, 0C NDOF.
+    #[must_use]
+    pub fn sensor_mode(&self, index: usize) -> u8 {
+        lock(&self.state).bus.sensors[index.min(15)].mode()
+    }
+
+    /// A register of the serial bridge.
+    #[must_use]
+    pub fn bridge_register(&self, address: usize) -> u8 {
+        lock(&self.state).bridge.register(address)
+    }
+
+    /// The multiplexer's connected channels, one bit each.
+    #[must_use]
+    pub fn channels(&self) -> u8 {
+        lock(&self.state).bus.channels
+    }
+
+    /// What it has counted.
+    #[must_use]
+    pub fn counters(&self) -> Counters {
+        let state = lock(&self.state);
+        Counters {
+            transactions: state.bus.transactions,
+            nacks: state.bus.nacks,
+            overflows: state.bridge.overflows,
+            refusals: state.bridge.refusals,
+        }
+    }
+
+    fn sensor(&self, index: usize, act: impl FnOnce(&mut super::bno055::Bno055)) {
+        if let Some(chip) = lock(&self.state).bus.sensors.get_mut(index) {
+            act(chip);
+        }
+    }
+}
