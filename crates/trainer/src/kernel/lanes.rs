@@ -1,0 +1,292 @@
+//! Sixteen f32 lanes, in AVX-512, AVX2 or plain code, with the same bits in each: no fused operations, no approximations.
+//!
+//! Every method is `inline(always)` and takes the target feature of the kernel it ends up in: kernels are generic functions, also
+//! `inline(always)`, called from one `#[target_feature]` function for each kind of machine (see [`super::dispatch`]).
+
+/// Lanes in a vector.
+pub(crate) const LANES: usize = 16;
+
+/// A vector of 16 f32.
+///
+/// # Safety
+/// All methods: the processor has the features of the implementing type (plain code: none). Pointers: valid for 16 f32.
+pub(crate) trait Lanes: Copy {
+    type Mask: Copy;
+    unsafe fn splat(value: f32) -> Self;
+    unsafe fn load(from: *const f32) -> Self;
+    unsafe fn store(self, to: *mut f32);
+    unsafe fn add(self, other: Self) -> Self;
+    unsafe fn sub(self, other: Self) -> Self;
+    unsafe fn mul(self, other: Self) -> Self;
+    unsafe fn div(self, other: Self) -> Self;
+    unsafe fn sqrt(self) -> Self;
+    /// Lane by lane `self > other`.
+    unsafe fn gt(self, other: Self) -> Self::Mask;
+    /// `self` where the mask is set, +0 elsewhere.
+    unsafe fn keep(self, mask: Self::Mask) -> Self;
+    /// `self` where the mask is set, `other` elsewhere.
+    unsafe fn choose(self, mask: Self::Mask, other: Self) -> Self;
+    /// Bit l is lane l of the mask.
+    unsafe fn bits(mask: Self::Mask) -> u16;
+    /// The mask with these bits.
+    unsafe fn mask(bits: u16) -> Self::Mask;
+
+    /// `self + a·b`, rounded twice.
+    #[inline(always)]
+    unsafe fn mul_add(self, a: Self, b: Self) -> Self {
+        // SAFETY: the caller's promise.
+        unsafe { self.add(a.mul(b)) }
+    }
+
+    /// The sum of the lanes by a halving tree (8, 4, 2, 1).
+    #[inline(always)]
+    unsafe fn sum(self) -> f32 {
+        let mut lanes = [0.0_f32; LANES];
+        // SAFETY: the array has 16 f32.
+        unsafe { self.store(lanes.as_mut_ptr()) };
+        let mut half = LANES / 2;
+        while half > 0 {
+            for l in 0..half {
+                lanes[l] += lanes[l + half];
+            }
+            half /= 2;
+        }
+        lanes[0]
+    }
+}
+
+/// Plain code, for any processor.
+#[derive(Clone, Copy)]
+pub(crate) struct Plain([f32; LANES]);
+
+impl Plain {
+    #[inline(always)]
+    fn zip(self, other: Self, op: impl Fn(f32, f32) -> f32) -> Self {
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = op(*a, b);
+        }
+        Self(out)
+    }
+}
+
+impl Lanes for Plain {
+    type Mask = u16;
+    #[inline(always)]
+    unsafe fn splat(value: f32) -> Self {
+        Self([value; LANES])
+    }
+    #[inline(always)]
+    unsafe fn load(from: *const f32) -> Self {
+        // SAFETY: the caller promises 16 f32 at `from`.
+        Self(unsafe { from.cast::<[f32; LANES]>().read_unaligned() })
+    }
+    #[inline(always)]
+    unsafe fn store(self, to: *mut f32) {
+        // SAFETY: the caller promises 16 f32 at `to`.
+        unsafe { to.cast::<[f32; LANES]>().write_unaligned(self.0) }
+    }
+    #[inline(always)]
+    unsafe fn add(self, other: Self) -> Self {
+        self.zip(other, |a, b| a + b)
+    }
+    #[inline(always)]
+    unsafe fn sub(self, other: Self) -> Self {
+        self.zip(other, |a, b| a - b)
+    }
+    #[inline(always)]
+    unsafe fn mul(self, other: Self) -> Self {
+        self.zip(other, |a, b| a * b)
+    }
+    #[inline(always)]
+    unsafe fn div(self, other: Self) -> Self {
+        self.zip(other, |a, b| a / b)
+    }
+    #[inline(always)]
+    unsafe fn sqrt(self) -> Self {
+        Self(self.0.map(libm::sqrtf))
+    }
+    #[inline(always)]
+    unsafe fn gt(self, other: Self) -> u16 {
+        let lanes = self.0.iter().zip(&other.0).enumerate();
+        lanes.fold(0, |bits, (l, (a, b))| bits | (u16::from(a > b) << l))
+    }
+    #[inline(always)]
+    unsafe fn keep(self, mask: u16) -> Self {
+        // SAFETY: plain code needs no feature.
+        unsafe { self.choose(mask, Self([0.0; LANES])) }
+    }
+    #[inline(always)]
+    unsafe fn choose(self, mask: u16, other: Self) -> Self {
+        let mut out = self.0;
+        for (l, (a, b)) in out.iter_mut().zip(other.0).enumerate() {
+            *a = if mask >> l & 1 == 1 { *a } else { b };
+        }
+        Self(out)
+    }
+    #[inline(always)]
+    unsafe fn bits(mask: u16) -> u16 {
+        mask
+    }
+    #[inline(always)]
+    unsafe fn mask(bits: u16) -> u16 {
+        bits
+    }
+}
+
+#[cfg(target_arch = "x86_64")]
+pub(crate) use x86::{Avx2, Avx512};
+
+#[cfg(target_arch = "x86_64")]
+mod x86 {
+    use super::Lanes;
+    use core::arch::x86_64::*;
+
+    /// One 512-bit register (AVX-512 F).
+    #[derive(Clone, Copy)]
+    pub(crate) struct Avx512(__m512);
+
+    // SAFETY of every block: the caller promises AVX-512 F, and valid pointers.
+    #[allow(clippy::undocumented_unsafe_blocks)]
+    impl Lanes for Avx512 {
+        type Mask = __mmask16;
+        #[inline(always)]
+        unsafe fn splat(value: f32) -> Self {
+            Self(unsafe { _mm512_set1_ps(value) })
+        }
+        #[inline(always)]
+        unsafe fn load(from: *const f32) -> Self {
+            Self(unsafe { _mm512_loadu_ps(from) })
+        }
+        #[inline(always)]
+        unsafe fn store(self, to: *mut f32) {
+            unsafe { _mm512_storeu_ps(to, self.0) }
+        }
+        #[inline(always)]
+        unsafe fn add(self, other: Self) -> Self {
+            Self(unsafe { _mm512_add_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        unsafe fn sub(self, other: Self) -> Self {
+            Self(unsafe { _mm512_sub_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        unsafe fn mul(self, other: Self) -> Self {
+            Self(unsafe { _mm512_mul_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        unsafe fn div(self, other: Self) -> Self {
+            Self(unsafe { _mm512_div_ps(self.0, other.0) })
+        }
+        #[inline(always)]
+        unsafe fn sqrt(self) -> Self {
+            Self(unsafe { _mm512_sqrt_ps(self.0) })
+        }
+        #[inline(always)]
+        unsafe fn gt(self, other: Self) -> __mmask16 {
+            unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, other.0) }
+        }
+        #[inline(always)]
+        unsafe fn keep(self, mask: __mmask16) -> Self {
+            Self(unsafe { _mm512_maskz_mov_ps(mask, self.0) })
+        }
+        #[inline(always)]
+        unsafe fn choose(self, mask: __mmask16, other: Self) -> Self {
+            Self(unsafe { _mm512_mask_mov_ps(other.0, mask, self.0) })
+        }
+        #[inline(always)]
+        unsafe fn bits(mask: __mmask16) -> u16 {
+            mask
+        }
+        #[inline(always)]
+        unsafe fn mask(bits: u16) -> __mmask16 {
+            bits
+        }
+    }
+
+    /// Two 256-bit registers (AVX2): lanes 0 to 7, 8 to 15.
+    #[derive(Clone, Copy)]
+    pub(crate) struct Avx2(__m256, __m256);
+
+    // SAFETY of every block: the caller promises AVX2, and valid pointers.
+    #[allow(clippy::undocumented_unsafe_blocks)]
+    impl Lanes for Avx2 {
+        type Mask = (__m256, __m256);
+        #[inline(always)]
+        unsafe fn splat(value: f32) -> Self {
+            let v = unsafe { _mm256_set1_ps(value) };
+            Self(v, v)
+        }
+        #[inline(always)]
+        unsafe fn load(from: *const f32) -> Self {
+            unsafe { Self(_mm256_loadu_ps(from), _mm256_loadu_ps(from.add(8))) }
+        }
+        #[inline(always)]
+        unsafe fn store(self, to: *mut f32) {
+            unsafe {
+                _mm256_storeu_ps(to, self.0);
+                _mm256_storeu_ps(to.add(8), self.1);
+            }
+        }
+        #[inline(always)]
+        unsafe fn add(self, o: Self) -> Self {
+            unsafe { Self(_mm256_add_ps(self.0, o.0), _mm256_add_ps(self.1, o.1)) }
+        }
+        #[inline(always)]
+        unsafe fn sub(self, o: Self) -> Self {
+            unsafe { Self(_mm256_sub_ps(self.0, o.0), _mm256_sub_ps(self.1, o.1)) }
+        }
+        #[inline(always)]
+        unsafe fn mul(self, o: Self) -> Self {
+            unsafe { Self(_mm256_mul_ps(self.0, o.0), _mm256_mul_ps(self.1, o.1)) }
+        }
+        #[inline(always)]
+        unsafe fn div(self, o: Self) -> Self {
+            unsafe { Self(_mm256_div_ps(self.0, o.0), _mm256_div_ps(self.1, o.1)) }
+        }
+        #[inline(always)]
+        unsafe fn sqrt(self) -> Self {
+            unsafe { Self(_mm256_sqrt_ps(self.0), _mm256_sqrt_ps(self.1)) }
+        }
+        #[inline(always)]
+        unsafe fn gt(self, o: Self) -> Self::Mask {
+            unsafe {
+                (
+                    _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, o.0),
+                    _mm256_cmp_ps::<_CMP_GT_OQ>(self.1, o.1),
+                )
+            }
+        }
+        #[inline(always)]
+        unsafe fn keep(self, mask: Self::Mask) -> Self {
+            unsafe { Self(_mm256_and_ps(self.0, mask.0), _mm256_and_ps(self.1, mask.1)) }
+        }
+        #[inline(always)]
+        unsafe fn choose(self, mask: Self::Mask, o: Self) -> Self {
+            unsafe {
+                Self(
+                    _mm256_blendv_ps(o.0, self.0, mask.0),
+                    _mm256_blendv_ps(o.1, self.1, mask.1),
+                )
+            }
+        }
+        #[inline(always)]
+        unsafe fn bits(mask: Self::Mask) -> u16 {
+            unsafe {
+                let low = _mm256_movemask_ps(mask.0) as u16;
+                low | ((_mm256_movemask_ps(mask.1) as u16) << 8)
+            }
+        }
+        #[inline(always)]
+        unsafe fn mask(bits: u16) -> Self::Mask {
+            unsafe {
+                let each = _mm256_setr_epi32(1, 2, 4, 8, 16, 32, 64, 128);
+                let half = |bits: u16| {
+                    let set = _mm256_and_si256(_mm256_set1_epi32(i32::from(bits)), each);
+                    _mm256_castsi256_ps(_mm256_cmpeq_epi32(set, each))
+                };
+                (half(bits & 255), half(bits >> 8))
+            }
+        }
+    }
+}
