@@ -26,6 +26,7 @@ pub mod event;
 pub mod filter;
 pub mod platform;
 pub mod posture;
+pub mod protocol;
 pub mod store;
 pub mod supervisor;
 pub mod telemetry;

@@ -113,6 +113,7 @@ pub const LIMITS: [(f32, f32); JOINT_COUNT] = {
 
 /// Which hand wears the glove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Side {
     /// Right hand: x is radial.
     #[default]
@@ -139,6 +140,15 @@ const fn first_segment(finger: usize) -> usize {
 /// First joint angle of finger `0` (thumb) to `4` (little); the next four follow it.
 const fn first_joint(finger: usize) -> usize {
     5 * finger
+}
+
+/// The segment that `segment` hangs on; `None` for the hand, and for a segment that does not exist.
+pub const fn parent(segment: usize) -> Option<usize> {
+    match segment {
+        0 | SEGMENT_COUNT.. => None,
+        s if (s - 1) % 3 == 0 => Some(0),
+        s => Some(s - 1),
+    }
 }
 
 /// Forward kinematics: the orientation of every segment relative to the `hand` segment.

@@ -10,6 +10,8 @@ const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 const CRC_BYTES: usize = 4;
 /// Bytes of the longest message.
 pub const MAX_MESSAGE: usize = 640;
+/// Bytes of a message with room for its CRC.
+pub const SCRATCH: usize = MAX_MESSAGE + CRC_BYTES;
 /// Bytes of the longest frame: message and CRC, one COBS byte for every 254 begun, and the closing zero.
 pub const MAX_FRAME: usize = MAX_MESSAGE + CRC_BYTES + (MAX_MESSAGE + CRC_BYTES) / 254 + 1 + 1;
 
@@ -35,13 +37,15 @@ pub enum Error {
 
 /// Frames the message of `length` bytes that the caller wrote at the start of `scratch`; returns the bytes for the line.
 pub fn encode<'o>(
-    scratch: &mut [u8; MAX_MESSAGE + CRC_BYTES],
+    scratch: &mut [u8; SCRATCH],
     length: usize,
     out: &'o mut [u8; MAX_FRAME],
 ) -> Result<&'o [u8], Error> {
     let (message, rest) = scratch.split_at_mut_checked(length).ok_or(Error::TooLong)?;
     let crc = CRC32.checksum(message).to_le_bytes();
-    rest.first_chunk_mut::<CRC_BYTES>().ok_or(Error::TooLong)?.copy_from_slice(&crc);
+    rest.first_chunk_mut::<CRC_BYTES>()
+        .ok_or(Error::TooLong)?
+        .copy_from_slice(&crc);
     let body = scratch.get(..length + CRC_BYTES).ok_or(Error::TooLong)?;
     let (closing, coded) = out.split_last_mut().ok_or(Error::TooLong)?;
     let count = cobs::try_encode(body, coded).map_err(|_| Error::TooLong)?;
@@ -67,7 +71,12 @@ impl Decoder {
         Self {
             gathered: Vec::new(),
             skipping: false,
-            counters: Counters { good: 0, crc: 0, coding: 0, oversized: 0 },
+            counters: Counters {
+                good: 0,
+                crc: 0,
+                coding: 0,
+                oversized: 0,
+            },
         }
     }
 
@@ -85,7 +94,11 @@ impl Decoder {
             }
             return None;
         }
-        let result = if self.skipping { None } else { self.finish(take) };
+        let result = if self.skipping {
+            None
+        } else {
+            self.finish(take)
+        };
         self.gathered.clear();
         self.skipping = false;
         result

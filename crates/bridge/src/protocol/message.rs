@@ -4,7 +4,7 @@
 //! order): append only, and raise [`VERSION`] when anything else changes. `docs/protocol.md` fixes it.
 
 use crate::config::SafeAction;
-use crate::{Counters as LoopCounters, Settings, State, config, filter, store, supervisor};
+use crate::{State, filter, store};
 use glove::hand::{JOINT_COUNT, Side};
 use gripper::{Activation, registers::Fault};
 use heapless::Vec;
@@ -21,7 +21,7 @@ pub const AXES: usize = 4;
 pub type PerAxis<T> = Vec<T, AXES>;
 
 /// From the host. Stop and wait: the next request follows the reply to this one, or its timeout.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Request<'a> {
     /// The session that hello began; the host chooses its number. A bridge that is busy with one refuses others.
     pub session: u32,
@@ -33,7 +33,7 @@ pub struct Request<'a> {
 }
 
 /// What a host can ask.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Call<'a> {
     /// Begins a session. Answer: [`Answer::Hello`].
     Hello {
@@ -263,30 +263,30 @@ pub struct Sample {
     pub latency_us: Option<u32>,
 }
 
-/// What a person may set, as [`Settings`].
+/// What a person may set, as [`crate::Settings`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
     /// Which hand wears the glove.
     pub side: Side,
     /// Smoothing of the map's output.
     pub filter: filter::Settings,
-    /// See [`Settings::fresh_frames`].
+    /// See [`crate::Settings::fresh_frames`].
     pub fresh_frames: u8,
-    /// See [`Settings::blend_ms`].
+    /// See [`crate::Settings::blend_ms`].
     pub blend_ms: u16,
-    /// See [`Settings::rate`].
+    /// See [`crate::Settings::rate`].
     pub rate: f32,
-    /// See [`Settings::lead`].
+    /// See [`crate::Settings::lead`].
     pub lead: u8,
-    /// See [`Settings::safe_action`].
+    /// See [`crate::Settings::safe_action`].
     pub safe_action: SafeAction,
-    /// See [`Settings::open_rate`].
+    /// See [`crate::Settings::open_rate`].
     pub open_rate: f32,
-    /// See [`Settings::speed`].
+    /// See [`crate::Settings::speed`].
     pub speed: PerAxis<u8>,
-    /// See [`Settings::force`].
+    /// See [`crate::Settings::force`].
     pub force: PerAxis<u8>,
-    /// See [`Settings::heading_is_relative`].
+    /// See [`crate::Settings::heading_is_relative`].
     pub heading_is_relative: bool,
 }
 
@@ -309,13 +309,6 @@ pub enum Refusal {
     Engaged,
     /// The weights store's word.
     Store(store::Error),
-    /// The image's bytes are not those announced.
-    ImageCrc {
-        /// CRC of the bytes that came.
-        found: u32,
-        /// CRC announced.
-        announced: u32,
-    },
     /// A setting out of its range.
     Configuration {
         /// Index in [`SETTING_NAMES`].

@@ -1,0 +1,10 @@
+//! The host protocol: how a host flashes weights into the bridge, closes its clutch, watches it.
+//!
+//! postcard messages ([`message`]) in COBS frames with a CRC-32 ([`frame`]), stop and wait; [`Server`] is the bridge's end.
+//! Any garbage on the line is survived and counted. `docs/protocol.md` fixes the bytes.
+
+pub mod frame;
+pub mod message;
+mod server;
+
+pub use server::{Outcome, Server};
