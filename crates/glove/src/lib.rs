@@ -4,6 +4,7 @@
 //!
 //! | module | what it knows |
 //! |---|---|
+//! | [`bus`] | what is asked of an I²C bus that does not wait |
 //! | [`sc18im`] | bytes of the serial bridge: one I²C transaction at a time, split-phase, with deadlines and resynchronisation |
 //! | [`timing`] | every time the glove waits for, and the sum behind it |
 //! | [`mux`] | which channel is connected |
@@ -12,16 +13,20 @@
 //! | [`hand`] | 25 joint angles ↔ 16 orientations, limits, calibration |
 //!
 //! Nothing here blocks, allocates or reads a clock: time comes in as an argument. The one exception is
-//! `sc18im::Blocking`, a wrapper for tools that want a blocking `embedded-hal` `I2c`.
+//! [`sc18im::Blocking`], a wrapper for tools that want a blocking `embedded-hal` `I2c`.
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod bus;
 pub mod hand;
 pub mod imu;
 pub mod mux;
 pub mod sc18im;
 pub mod scan;
 pub mod timing;
+
+#[cfg(test)]
+mod testing;
 
 /// A point in time, in microseconds since an origin that the platform chooses.
 pub type Instant = fugit::MonotonicInstant<u64, 1, 1_000_000>;

@@ -1,1 +1,624 @@
-//! The SC18IM700/704 UART-to-I²C bridge.
+//! The SC18IM700/704 UART-to-I²C bridge: a split-phase state machine over a serial port.
+//!
+//! One command goes out in one serial write, its reply is known by its length, and nothing waits: [`Sc18im::poll`] reads
+//! what has arrived and looks at the time it is given. Deadlines are in [`crate::timing`].
+//!
+//! The chip reports no error in band. A write is therefore sent together with a request for I2CStat, whose one byte
+//! is the answer; a read that brings too few bytes is followed, after the line has become quiet, by a request for
+//! I2CStat, which tells why. A chip that does not answer even that, or answers what no status can be, has lost step (a
+//! byte was lost, it is half through a command): it is left alone for its idle timeout and asked again, a bounded number
+//! of times at that pace, rarely after that. All of these are states with a due time.
+//!
+//! Data sheets: NXP SC18IM700 rev. 2, SC18IM704 rev. 1. What this module does not do: GPIO, power-down, `O`/`I` commands.
+
+use crate::Instant;
+use crate::bus::{Batch, Bus, Error, Reply};
+use crate::timing::{self, after};
+use command::{Command, Expected};
+use heapless::Vec;
+
+mod blocking;
+mod command;
+
+pub use blocking::Blocking;
+pub use command::{baud_divisor, register};
+
+/// A serial port that does not block: `read_ready` before `read`, and writes that go to a queue.
+pub trait SerialPort: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write {}
+impl<S: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write> SerialPort for S {}
+
+/// Longest reply: three messages of 16 bytes and a status.
+const REPLY_MAX: usize = 49;
+
+/// Most bytes taken from the port in one poll, so that a babbling line cannot hold the caller.
+const READ_MAX: usize = 128;
+
+/// How the serial bridge is run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Config {
+    /// Baud of the port, which must be open at it.
+    pub baud: u32,
+    /// Value of I2CClkL and I2CClkH ([`timing::I2C_DIVIDER`]); `None` leaves the chip's.
+    pub clock_divider: Option<u8>,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            baud: 115_200,
+            clock_divider: Some(timing::I2C_DIVIDER),
+        }
+    }
+}
+
+/// Counts since start; each wraps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Counters {
+    /// Commands sent.
+    pub commands: u32,
+    /// I²C transactions that failed: not acknowledged, or timed out on the bus.
+    pub bus_errors: u32,
+    /// Replies that lost bytes although the bus did its work.
+    pub lost: u32,
+    /// Bytes that belonged to no reply: noise, or late.
+    pub stray: u32,
+    /// Times the serial bridge lost step.
+    pub resyncs: u32,
+    /// Failures of the serial port.
+    pub port_errors: u32,
+    /// Times the chip did not keep the I²C clock it was given.
+    pub clock_refused: u32,
+}
+
+/// What the link is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum State {
+    /// Left alone until `due`, then asked for its status; `tries` so far.
+    Down { due: Instant, tries: u8 },
+    /// Asked for its status; anything but one status byte is another try.
+    Probe {
+        settled: Instant,
+        deadline: Instant,
+        tries: u8,
+    },
+    /// The I²C clock was written; waiting for it to be read back.
+    Setup { deadline: Instant, tries: u8 },
+    /// Ready.
+    Idle,
+    /// Waiting for a reply.
+    Exchange {
+        expected: Expected,
+        deadline: Instant,
+    },
+    /// A reply fell short: waiting for the line to be quiet.
+    Drain {
+        short: Short,
+        quiet: Instant,
+        give_up: Instant,
+    },
+    /// Asked for the status that explains it.
+    Diagnose {
+        short: Short,
+        deadline: Instant,
+        settled: Option<(u8, Instant)>,
+    },
+    /// The baud was changed: nothing may be sent yet.
+    Pause { until: Instant },
+}
+
+/// A reply that fell short, and how often its reason was asked for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Short {
+    expected: u8,
+    received: u8,
+    asked: u8,
+}
+
+/// How often the reason for a short reply is asked before the chip counts as out of step.
+const DIAGNOSE_TRIES: u8 = 3;
+
+/// The serial bridge. Owns the port.
+#[derive(Debug)]
+pub struct Sc18im<S> {
+    serial: S,
+    config: Config,
+    state: State,
+    received: Vec<u8, REPLY_MAX>,
+    counters: Counters,
+}
+
+impl<S> Sc18im<S> {
+    /// Takes an open port. Nothing is sent before the first [`Bus::poll`], which asks the chip for its status.
+    pub fn new(serial: S, config: Config) -> Self {
+        let state = State::Down {
+            due: Instant::from_ticks(0),
+            tries: 0,
+        };
+        Self {
+            serial,
+            config,
+            state,
+            received: Vec::new(),
+            counters: Counters::default(),
+        }
+    }
+
+    /// Counts since start.
+    pub fn counters(&self) -> &Counters {
+        &self.counters
+    }
+
+    /// The port.
+    pub fn serial_mut(&mut self) -> &mut S {
+        &mut self.serial
+    }
+
+    /// Gives the port back.
+    pub fn release(self) -> S {
+        self.serial
+    }
+
+    /// Says that the port now runs at `baud` (after [`Sc18im::change_baud`]): deadlines follow.
+    pub fn set_line_baud(&mut self, baud: u32) {
+        self.config.baud = baud;
+    }
+}
+
+impl<S: SerialPort> Sc18im<S> {
+    /// Tells the chip to change its baud: `57 00 lo 01 hi 50`, alone.
+    ///
+    /// Nothing answers. The machine pauses for the bytes plus [`timing::BAUD_SETTLE`]; reopen the port at the new speed
+    /// within that time, then call [`Sc18im::set_line_baud`].
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`] for a baud the chip cannot make, [`Error::Busy`], [`Error::NoAnswer`], [`Error::Port`].
+    pub fn change_baud(&mut self, baud: u32, now: Instant) -> Result<(), Error> {
+        let [low, high] = baud_divisor(baud).ok_or(Error::Unsupported)?.to_le_bytes();
+        self.require_idle()?;
+        let mut command = Command::new();
+        let values = [(register::BRG0, low), (register::BRG1, high)];
+        command::append_write_registers(&mut command, &values)?;
+        self.send_or_fail(&command, now)?;
+        let wait = timing::serial(command.len(), self.config.baud) + timing::BAUD_SETTLE;
+        self.state = State::Pause {
+            until: after(now, wait),
+        };
+        Ok(())
+    }
+
+    fn require_idle(&self) -> Result<(), Error> {
+        match self.state {
+            State::Idle => Ok(()),
+            State::Down { .. } | State::Probe { .. } | State::Setup { .. } => Err(Error::NoAnswer),
+            _ => Err(Error::Busy),
+        }
+    }
+
+    /// Writes a command at once, or not at all for the caller to see. Bounded: each round takes a byte or ends.
+    fn send(&mut self, command: &[u8]) -> Result<(), Error> {
+        let mut rest = command;
+        while !rest.is_empty() {
+            match self.serial.write(rest) {
+                Ok(taken) if taken > 0 && taken <= rest.len() => rest = &rest[taken..],
+                _ => {
+                    self.counters.port_errors = self.counters.port_errors.wrapping_add(1);
+                    return Err(Error::Port);
+                }
+            }
+        }
+        self.counters.commands = self.counters.commands.wrapping_add(1);
+        Ok(())
+    }
+
+    /// [`Sc18im::send`]; a failure takes the link down, since half a command may be out.
+    fn send_or_fail(&mut self, command: &[u8], now: Instant) -> Result<(), Error> {
+        self.send(command).inspect_err(|_| self.go_down(now, 0))
+    }
+
+    /// Takes what has arrived, at most [`READ_MAX`] bytes: the first `keep` bytes are stored, the rest is counted as
+    /// stray. Returns how many bytes came.
+    fn pump(&mut self, keep: usize) -> Result<usize, Error> {
+        let mut total = 0;
+        while total < READ_MAX {
+            let mut buffer = [0; 32];
+            match self.serial.read_ready() {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(_) => return Err(self.port_error()),
+            }
+            let count = match self.serial.read(&mut buffer) {
+                Ok(0) => break,
+                Ok(count) => count.min(buffer.len()),
+                Err(_) => return Err(self.port_error()),
+            };
+            total += count;
+            for byte in &buffer[..count] {
+                if self.received.len() >= keep || self.received.push(*byte).is_err() {
+                    self.counters.stray = self.counters.stray.wrapping_add(1);
+                }
+            }
+        }
+        Ok(total)
+    }
+
+    fn port_error(&mut self) -> Error {
+        self.counters.port_errors = self.counters.port_errors.wrapping_add(1);
+        Error::Port
+    }
+
+    /// Leaves the chip alone for its idle timeout; longer once it counts as dead.
+    fn go_down(&mut self, now: Instant, tries: u8) {
+        if !matches!(
+            self.state,
+            State::Down { .. } | State::Probe { .. } | State::Setup { .. }
+        ) {
+            self.counters.resyncs = self.counters.resyncs.wrapping_add(1);
+        }
+        let wait = if tries >= timing::RESYNC_TRIES {
+            timing::DEAD_RETRY
+        } else {
+            timing::IDLE_TIMEOUT
+        };
+        self.state = State::Down {
+            due: after(now, wait),
+            tries,
+        };
+    }
+
+    /// Asks for the status and says until when to wait for it.
+    fn ask_status(&mut self, now: Instant) -> Result<Instant, Error> {
+        self.received.clear();
+        self.send(&command::STATUS)?;
+        Ok(after(
+            now,
+            timing::reply(command::STATUS.len(), 1, 0, self.config.baud),
+        ))
+    }
+
+    fn poll_state(&mut self, now: Instant) -> Result<Option<Reply>, Error> {
+        match self.state {
+            State::Down { due, tries } => self.poll_down(due, tries, now),
+            State::Probe {
+                settled,
+                deadline,
+                tries,
+            } => self.poll_probe(settled, deadline, tries, now),
+            State::Setup { deadline, tries } => self.poll_setup(deadline, tries, now),
+            State::Idle => Ok(None),
+            State::Exchange { expected, deadline } => self.poll_exchange(expected, deadline, now),
+            State::Drain {
+                short,
+                quiet,
+                give_up,
+            } => self.poll_drain(short, quiet, give_up, now),
+            State::Diagnose {
+                short,
+                deadline,
+                settled,
+            } => self.poll_diagnose(short, deadline, settled, now),
+            State::Pause { until } => {
+                if now >= until {
+                    self.pump(0)?;
+                    self.state = State::Idle;
+                }
+                Ok(None)
+            }
+        }
+    }
+
+    fn poll_down(&mut self, due: Instant, tries: u8, now: Instant) -> Result<Option<Reply>, Error> {
+        self.pump(0)?;
+        if now >= due {
+            let deadline = self.ask_status(now)?;
+            let answered = timing::serial(command::STATUS.len() + 1, self.config.baud);
+            let settled = after(now, answered + timing::QUIET);
+            self.state = State::Probe {
+                settled,
+                deadline,
+                tries,
+            };
+        }
+        Ok(None)
+    }
+
+    fn poll_probe(
+        &mut self,
+        settled: Instant,
+        deadline: Instant,
+        tries: u8,
+        now: Instant,
+    ) -> Result<Option<Reply>, Error> {
+        self.pump(REPLY_MAX)?;
+        if self.in_step() && now >= settled {
+            self.begin_setup(tries, now)?;
+        } else if now >= deadline {
+            self.go_down(now, tries.saturating_add(1));
+        }
+        Ok(None)
+    }
+
+    /// One status byte, and nothing else: the chip is in step, once the line had time to be quiet.
+    fn in_step(&self) -> bool {
+        matches!(self.received.as_slice(), [byte] if command::is_status(*byte))
+    }
+
+    fn begin_setup(&mut self, tries: u8, now: Instant) -> Result<(), Error> {
+        let Some(divider) = self.config.clock_divider else {
+            self.state = State::Idle;
+            return Ok(());
+        };
+        let mut command = Command::new();
+        let values = setup_values(divider);
+        command::append_write_registers(&mut command, &values)?;
+        for (register, _) in values {
+            command::append_read_register(&mut command, register)?;
+        }
+        self.received.clear();
+        self.send(&command)?;
+        let wait = timing::reply(command.len(), values.len(), 0, self.config.baud);
+        self.state = State::Setup {
+            deadline: after(now, wait),
+            tries,
+        };
+        Ok(())
+    }
+
+    fn poll_setup(
+        &mut self,
+        deadline: Instant,
+        tries: u8,
+        now: Instant,
+    ) -> Result<Option<Reply>, Error> {
+        let values = setup_values(self.config.clock_divider.unwrap_or(timing::I2C_DIVIDER));
+        self.pump(values.len())?;
+        if self.received.len() == values.len() {
+            if values
+                .iter()
+                .zip(&self.received)
+                .any(|((_, wrote), read)| wrote != read)
+            {
+                // A slower bus still works: counted, not fatal.
+                self.counters.clock_refused = self.counters.clock_refused.wrapping_add(1);
+            }
+            self.state = State::Idle;
+        } else if now >= deadline {
+            self.go_down(now, tries.saturating_add(1));
+        }
+        Ok(None)
+    }
+
+    fn poll_exchange(
+        &mut self,
+        expected: Expected,
+        deadline: Instant,
+        now: Instant,
+    ) -> Result<Option<Reply>, Error> {
+        self.pump(expected.bytes)?;
+        if self.received.len() >= expected.bytes {
+            return self.finish(expected, now);
+        }
+        if now >= deadline {
+            self.drain(expected, 0, now);
+        }
+        Ok(None)
+    }
+
+    /// All bytes are there.
+    fn finish(&mut self, expected: Expected, now: Instant) -> Result<Option<Reply>, Error> {
+        if expected.status {
+            match self.received.pop() {
+                Some(status) if command::is_status(status) => self.judge(status)?,
+                _ => {
+                    // Not a status: the reply is out of step with its command.
+                    self.drain(expected, 0, now);
+                    return Ok(None);
+                }
+            }
+        }
+        self.state = State::Idle;
+        Ok(Some(Reply::from_slice(&self.received).unwrap_or_default()))
+    }
+
+    /// The error an I2CStat means; the link is idle after it.
+    fn judge(&mut self, status: u8) -> Result<(), Error> {
+        self.state = State::Idle;
+        let error = match status {
+            command::STATUS_OK => return Ok(()),
+            command::STATUS_NACK_ADDRESS => Error::NackAddress,
+            command::STATUS_NACK_DATA => Error::NackData,
+            command::STATUS_TIMEOUT => Error::BusTimeout,
+            other => Error::Status(other),
+        };
+        self.counters.bus_errors = self.counters.bus_errors.wrapping_add(1);
+        Err(error)
+    }
+
+    fn drain(&mut self, expected: Expected, asked: u8, now: Instant) {
+        let short = Short {
+            expected: expected.bytes as u8,
+            received: self.received.len() as u8,
+            asked,
+        };
+        self.drain_again(short, now);
+    }
+
+    fn drain_again(&mut self, short: Short, now: Instant) {
+        self.state = State::Drain {
+            short,
+            quiet: after(now, timing::QUIET),
+            give_up: after(now, timing::DRAIN_MAX),
+        };
+    }
+
+    fn poll_drain(
+        &mut self,
+        short: Short,
+        quiet: Instant,
+        give_up: Instant,
+        now: Instant,
+    ) -> Result<Option<Reply>, Error> {
+        let came = self.pump(0)? > 0;
+        if now >= give_up && (came || now < quiet) {
+            self.go_down(now, 0);
+            return Err(Error::NoAnswer);
+        }
+        if came {
+            self.state = State::Drain {
+                short,
+                quiet: after(now, timing::QUIET),
+                give_up,
+            };
+        } else if now >= quiet {
+            let deadline = self.ask_status(now)?;
+            self.state = State::Diagnose {
+                short,
+                deadline,
+                settled: None,
+            };
+        }
+        Ok(None)
+    }
+
+    fn poll_diagnose(
+        &mut self,
+        short: Short,
+        deadline: Instant,
+        settled: Option<(u8, Instant)>,
+        now: Instant,
+    ) -> Result<Option<Reply>, Error> {
+        self.pump(REPLY_MAX)?;
+        match (self.received.as_slice(), settled) {
+            ([], _) if now >= deadline => {
+                self.go_down(now, 0);
+                Err(Error::NoAnswer)
+            }
+            ([], _) => Ok(None),
+            ([status], None) if command::is_status(*status) => {
+                // A late byte of the reply may look like a status: it would not come alone.
+                let settled = Some((*status, after(now, timing::QUIET)));
+                self.state = State::Diagnose {
+                    short,
+                    deadline,
+                    settled,
+                };
+                Ok(None)
+            }
+            ([_], Some((status, until))) => {
+                if now < until {
+                    return Ok(None);
+                }
+                self.judge(status)?;
+                self.counters.lost = self.counters.lost.wrapping_add(1);
+                Err(Error::Lost {
+                    expected: short.expected,
+                    received: short.received,
+                })
+            }
+            _ if short.asked + 1 >= DIAGNOSE_TRIES => {
+                self.go_down(now, 0);
+                Err(Error::NoAnswer)
+            }
+            _ => {
+                let late = self.received.len() as u32;
+                self.counters.stray = self.counters.stray.wrapping_add(late);
+                self.drain_again(
+                    Short {
+                        asked: short.asked + 1,
+                        ..short
+                    },
+                    now,
+                );
+                Ok(None)
+            }
+        }
+    }
+}
+
+/// What [`State::Setup`] writes and reads back.
+fn setup_values(divider: u8) -> [(u8, u8); 3] {
+    [
+        (register::I2C_CLK_L, divider),
+        (register::I2C_CLK_H, divider),
+        (register::I2C_TO, timing::I2C_TIMEOUT),
+    ]
+}
+
+impl<S: SerialPort> Bus for Sc18im<S> {
+    fn start(&mut self, batch: &Batch, now: Instant) -> Result<(), Error> {
+        let (command, expected) = command::batch(batch)?;
+        self.require_idle()?;
+        // What is there before the question is not its answer.
+        if self.pump(0).is_err() {
+            self.go_down(now, 0);
+            return Err(Error::Port);
+        }
+        self.received.clear();
+        self.send_or_fail(&command, now)?;
+        let wait = timing::reply(
+            command.len(),
+            expected.bytes,
+            expected.i2c,
+            self.config.baud,
+        );
+        self.state = State::Exchange {
+            expected,
+            deadline: after(now, wait),
+        };
+        Ok(())
+    }
+
+    fn poll(&mut self, now: Instant) -> Option<Result<Reply, Error>> {
+        let asked = matches!(
+            self.state,
+            State::Exchange { .. } | State::Drain { .. } | State::Diagnose { .. }
+        );
+        match self.poll_state(now) {
+            Ok(reply) => reply.map(Ok),
+            Err(error) => {
+                if error == Error::Port {
+                    let tries = match self.state {
+                        State::Down { tries, .. }
+                        | State::Probe { tries, .. }
+                        | State::Setup { tries, .. } => tries.saturating_add(1),
+                        _ => 0,
+                    };
+                    self.go_down(now, tries);
+                }
+                asked.then_some(Err(error))
+            }
+        }
+    }
+
+    fn next_due(&self) -> Option<Instant> {
+        match self.state {
+            State::Idle => None,
+            State::Down { due, .. } => Some(due),
+            State::Probe {
+                settled, deadline, ..
+            } => Some(if self.in_step() { settled } else { deadline }),
+            State::Setup { deadline, .. } | State::Exchange { deadline, .. } => Some(deadline),
+            State::Drain { quiet, .. } => Some(quiet),
+            State::Diagnose {
+                deadline, settled, ..
+            } => Some(settled.map_or(deadline, |(_, until)| until)),
+            State::Pause { until } => Some(until),
+        }
+    }
+
+    fn is_up(&self) -> bool {
+        !matches!(
+            self.state,
+            State::Down { .. } | State::Probe { .. } | State::Setup { .. }
+        )
+    }
+
+    fn is_dead(&self) -> bool {
+        match self.state {
+            State::Down { tries, .. } | State::Probe { tries, .. } => tries >= timing::RESYNC_TRIES,
+            _ => false,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

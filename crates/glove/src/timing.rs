@@ -1,1 +1,140 @@
-//! Every time the glove waits for.
+//! Every time the glove waits for, and the sum behind it.
+//!
+//! Serial: 8N1, 10 bits a byte; at 115200 baud a byte takes 86.8 µs. I²C: 9 bits a byte; at the 369 kHz that
+//! [`I2C_DIVIDER`] sets, 24.4 µs, at the serial bridge's slowest useful clock (97 kHz) 93 µs.
+//!
+//! One scan at 115200 baud, 8 channels with 2 sensors each, as [`crate::scan`] does it:
+//!
+//! | what | bytes sent | bytes received | times |
+//! |---|---|---|---|
+//! | select a channel and read the selection back | 5 + 4 | 1 | 8 |
+//! | quaternion, register pointer known | 4 | 8 | 16 |
+//!
+//! 8 · 10 + 16 · 12 = 272 bytes = 23.6 ms. On the I²C bus 8 · (2 + 2) + 16 · 9 = 176 bytes = 4.3 ms, of which a scan sees
+//! all (the bridge starts to answer when it has the byte, so the last bytes overlap a little). Sum: 27.9 ms. With the
+//! register written before every read (4 + 2 more bytes a sensor) it would be 34.2 ms; unverified selections and written
+//! registers make 30.6 ms.
+
+use crate::{Duration, Instant};
+
+/// Bits a byte takes on the serial line: start, 8 data, stop.
+pub const BITS_PER_BYTE: u64 = 10;
+
+/// Register value for I2CClkL and I2CClkH: 7.3728 MHz / (2 · (5 + 5)) = 369 kHz on an SC18IM700, 15 MHz / (8 · 5) =
+/// 375 kHz on an SC18IM704. The BNO055 allows 400 kHz.
+pub const I2C_DIVIDER: u8 = 5;
+
+/// Register value for I2CTO: enabled (bit 0), 3 · 4.44 ms = 13.3 ms (bits 7..1). A BNO055 stretches the clock by a few
+/// milliseconds at most, and the reply deadline (bytes + [`REPLY_SLACK`]) is later, so that a hung bus is reported by the
+/// bridge and not mistaken for its silence.
+pub const I2C_TIMEOUT: u8 = 3 << 1 | 1;
+
+/// What one I²C byte may take when a deadline is set: 93 µs at 97 kHz plus 180 µs of clock stretching (reported by users).
+pub const I2C_BYTE: Duration = Duration::from_ticks(273);
+
+/// What a transaction may wait besides its bytes: 16 ms latency timer of a USB serial adapter left at its default, plus
+/// 9 ms for a busy host to run us.
+pub const REPLY_SLACK: Duration = Duration::from_ticks(25_000);
+
+/// Silence that ends a drain: longer than the gap between two bytes of one reply on any port that is set up well (1 ms
+/// latency timer), and rounded up.
+pub const QUIET: Duration = Duration::from_ticks(2_000);
+
+/// A drain gives up after this long of bytes that do not stop: 49 bytes, the longest reply, take 51 ms at 9600 baud.
+pub const DRAIN_MAX: Duration = Duration::from_ticks(60_000);
+
+/// The serial bridge forgets half a command after 655 ms without a byte (not confirmed by its vendor); a little more.
+pub const IDLE_TIMEOUT: Duration = Duration::from_ticks(660_000);
+
+/// How often a silent serial bridge is asked, [`IDLE_TIMEOUT`] apart, before it counts as dead.
+pub const RESYNC_TRIES: u8 = 5;
+
+/// How often a dead serial bridge is asked: somebody may plug it in.
+pub const DEAD_RETRY: Duration = Duration::from_ticks(2_000_000);
+
+/// After BRG1 is written the serial bridge needs 1 ms; twice that.
+pub const BAUD_SETTLE: Duration = Duration::from_ticks(2_000);
+
+/// Any mode to CONFIG takes the BNO055 19 ms (data sheet table 3-6); 1 ms more.
+pub const MODE_TO_CONFIG: Duration = Duration::from_ticks(20_000);
+
+/// CONFIG to any mode takes the BNO055 7 ms (data sheet table 3-6); 3 ms more.
+pub const CONFIG_TO_MODE: Duration = Duration::from_ticks(10_000);
+
+/// Reset to configuration mode takes the BNO055 650 ms (data sheet table 0-2); it does not acknowledge meanwhile.
+pub const RESET: Duration = Duration::from_ticks(650_000);
+
+/// Pause between two tries of a step that a sensor did not answer or has not reached yet.
+pub const STEP_RETRY: Duration = Duration::from_ticks(20_000);
+
+/// How often a step is tried, [`STEP_RETRY`] apart, before the bring-up starts over: 50 · 20 ms = 1 s, more than a reset.
+pub const STEP_TRIES: u8 = 50;
+
+/// First pause after a failed bring-up; it doubles up to [`BACKOFF_MAX`].
+pub const BACKOFF_MIN: Duration = Duration::from_ticks(250_000);
+
+/// Longest pause after a failed bring-up.
+pub const BACKOFF_MAX: Duration = Duration::from_ticks(2_000_000);
+
+/// The fusion gives its first quaternion within this after the mode is set, else the sensor is brought up again.
+pub const FIRST_SAMPLE: Duration = Duration::from_ticks(1_000_000);
+
+/// The fusion runs at 100 Hz: two reads may see a step of this age however close they are.
+pub const FUSION_PERIOD: Duration = Duration::from_ticks(10_000);
+
+/// A sensor whose bytes have not changed for this long is a candidate for "frozen".
+pub const FROZEN_AFTER: Duration = Duration::from_ticks(500_000);
+
+/// A sensor whose bytes stand still for this long has no flicker to be known by: ten periods of its fusion.
+pub const STANDSTILL: Duration = Duration::from_ticks(100_000);
+
+/// The frozen sensor is restarted after this long.
+pub const FROZEN_RESTART: Duration = Duration::from_ticks(1_000_000);
+
+/// Time `bytes` take on the serial line at `baud`, rounded up. A baud of zero counts as 1.
+pub fn serial(bytes: usize, baud: u32) -> Duration {
+    let bits = bytes as u64 * BITS_PER_BYTE;
+    Duration::from_ticks((bits * 1_000_000).div_ceil(u64::from(baud.max(1))))
+}
+
+/// Longest time from the first byte sent to the last received: the bytes on the line, the bytes on the I²C bus, and
+/// [`REPLY_SLACK`].
+pub fn reply(sent: usize, received: usize, i2c: usize, baud: u32) -> Duration {
+    let i2c = Duration::from_ticks(I2C_BYTE.as_ticks() * i2c as u64);
+    serial(sent + received, baud) + i2c + REPLY_SLACK
+}
+
+/// `now + wait`, at the end of time at most.
+pub(crate) fn after(now: Instant, wait: Duration) -> Instant {
+    Instant::from_ticks(now.as_ticks().saturating_add(wait.as_ticks()))
+}
+
+/// `now − earlier`, zero if `earlier` is later.
+pub(crate) fn since(now: Instant, earlier: Instant) -> Duration {
+    Duration::from_ticks(now.as_ticks().saturating_sub(earlier.as_ticks()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_byte_at_115200_baud_takes_86_8_microseconds() {
+        assert_eq!(serial(1, 115_200).as_ticks(), 87);
+        assert_eq!(serial(1000, 115_200).as_ticks(), 86_806);
+        assert_eq!(serial(1, 0).as_ticks(), 10_000_000);
+    }
+
+    #[test]
+    fn the_bridge_reports_a_hung_bus_before_the_deadline() {
+        let hung = u64::from(I2C_TIMEOUT >> 1) * 4_440;
+        assert!(hung < REPLY_SLACK.as_ticks());
+    }
+
+    #[test]
+    fn time_does_not_overflow() {
+        let end = Instant::from_ticks(u64::MAX);
+        assert_eq!(after(end, RESET), end);
+        assert_eq!(since(Instant::from_ticks(0), end).as_ticks(), 0);
+    }
+}

@@ -1,0 +1,386 @@
+//! The scanner's moves: which transaction is next, and what its reply means.
+
+use super::{BusScanner, Frame};
+use crate::bus::{Batch, Bus, Error, Reply, Transaction};
+use crate::hand::SEGMENT_COUNT;
+use crate::imu::bringup::{BringUp, Next};
+use crate::imu::{self, SAMPLE_BYTES, register};
+use crate::timing::after;
+use crate::{Instant, scan::sensor::Sensor};
+
+/// What is under way on the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Job {
+    /// A sample of `sensor`, asked for at `stamp`.
+    Sample {
+        sensor: usize,
+        stamp: Instant,
+        selects: bool,
+        plain: bool,
+    },
+    /// The selection of the channel of the step's sensor.
+    Select { sensor: usize },
+    /// A transaction of the step.
+    Step,
+}
+
+/// A step of a bring-up under way.
+#[derive(Debug)]
+pub(super) struct ActiveStep {
+    sensor: usize,
+    bring_up: BringUp,
+}
+
+/// Which part of the round the scanner is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Phase {
+    /// Bring-up before the first scan.
+    Starting,
+    /// Reading; `next` is the sensor to read.
+    Reading { next: usize, began: Instant },
+    /// Between two scans, the last of which began at `began`: one step of a bring-up, if any is due.
+    Between { began: Instant, stepped: bool },
+}
+
+impl<B: Bus> BusScanner<B> {
+    /// Does what is due at `now`; returns a frame when a scan is complete. Never waits, and starts at most one
+    /// transaction.
+    pub fn poll(&mut self, now: Instant) -> Option<Frame> {
+        let mut frame = None;
+        if let Some(result) = self.bus.poll(now) {
+            frame = self.take(result, now);
+        }
+        if !self.bus.is_up() {
+            self.lose_bus();
+            return frame;
+        }
+        if self.job.is_none() {
+            let more = self.start_next(now);
+            frame = frame.or(more);
+        }
+        frame
+    }
+
+    /// When [`BusScanner::poll`] has something to do even if no byte arrives; `None` only if it has nothing at all to do.
+    pub fn next_due(&self) -> Option<Instant> {
+        if self.job.is_some() || !self.bus.is_up() {
+            return self.bus.next_due();
+        }
+        let steps = self
+            .sensors
+            .iter()
+            .filter(|s| !s.is_running())
+            .map(|s| s.due)
+            .min();
+        let running = self.sensors.iter().any(Sensor::is_running);
+        let scan = match self.phase {
+            Phase::Starting => None,
+            Phase::Reading { .. } => Some(Instant::from_ticks(0)),
+            Phase::Between { began, .. } => running.then(|| after(began, self.config.period)),
+        };
+        match (steps, scan) {
+            (Some(a), Some(b)) => Some(a.min(b)),
+            (a, b) => a.or(b),
+        }
+    }
+
+    /// The way to the sensors is gone: what was under way is void, and nothing about pointers and channels is known.
+    fn lose_bus(&mut self) {
+        self.job = None;
+        self.step = None;
+        self.mux.forget();
+        self.sensors.iter_mut().for_each(Sensor::forget);
+        if let Phase::Reading { began, .. } = self.phase {
+            self.phase = Phase::Between {
+                began,
+                stepped: false,
+            };
+        }
+    }
+
+    fn take(&mut self, result: Result<Reply, Error>, now: Instant) -> Option<Frame> {
+        if result.is_err() {
+            self.mux.forget();
+        }
+        match self.job.take()? {
+            Job::Sample {
+                sensor,
+                stamp,
+                selects,
+                plain,
+            } => {
+                self.take_sample(sensor, stamp, selects, plain, result, now);
+                self.finish_scan(now)
+            }
+            Job::Select { sensor } => {
+                self.take_selection(sensor, result, now);
+                None
+            }
+            Job::Step => {
+                self.take_step(result.as_deref().map_err(|e| *e));
+                None
+            }
+        }
+    }
+
+    fn take_sample(
+        &mut self,
+        k: usize,
+        stamp: Instant,
+        selects: bool,
+        plain: bool,
+        result: Result<Reply, Error>,
+        now: Instant,
+    ) {
+        let sample = result.and_then(|reply| {
+            let (confirmation, sample) = reply
+                .split_at_checked(usize::from(selects))
+                .ok_or(Error::Unsupported)?;
+            if let [read_back] = confirmation {
+                self.confirm(k, *read_back)?;
+            }
+            <[u8; SAMPLE_BYTES]>::try_from(sample).map_err(|_| Error::Unsupported)
+        });
+        let Some(sensor) = self.sensors.get_mut(k) else {
+            return;
+        };
+        match sample {
+            Ok(raw) => sensor.take(raw, stamp, plain, &mut self.counters),
+            Err(cause) => sensor.miss(cause, now, &mut self.counters),
+        }
+    }
+
+    fn confirm(&mut self, k: usize, read_back: u8) -> Result<(), Error> {
+        self.mux
+            .confirm(imu::channel(k), read_back)
+            .inspect_err(|_| {
+                self.counters.mux_errors = self.counters.mux_errors.wrapping_add(1);
+            })
+    }
+
+    fn take_selection(&mut self, k: usize, result: Result<Reply, Error>, now: Instant) {
+        let confirmed = result.and_then(|reply| match reply.as_slice() {
+            [read_back] => self.confirm(k, *read_back),
+            _ => Err(Error::Unsupported),
+        });
+        if let Err(cause) = confirmed {
+            self.fail_step(imu::Error::Mux(cause), now);
+        }
+    }
+
+    fn take_step(&mut self, result: Result<&[u8], Error>) {
+        if let Some(active) = &mut self.step {
+            active.bring_up.supply(result);
+        }
+    }
+
+    fn fail_step(&mut self, error: imu::Error, now: Instant) {
+        let Some(active) = self.step.take() else {
+            return;
+        };
+        if let Some(sensor) = self.sensors.get_mut(active.sensor)
+            && sensor.step_failed(active.bring_up.step(), error, now)
+        {
+            self.counters.failed_starts = self.counters.failed_starts.wrapping_add(1);
+        }
+    }
+
+    /// Starts the next transaction there is. Each round of the loop ends one thing, so it ends.
+    fn start_next(&mut self, now: Instant) -> Option<Frame> {
+        // A step that needs no transaction, then the next thing; a scan over; a sensor found.
+        for _ in 0..4 {
+            if self.step.is_some() {
+                if self.advance_step(now) {
+                    return None;
+                }
+                continue;
+            }
+            match self.phase {
+                Phase::Starting => {
+                    if !self.begin_step(now) {
+                        if self.sensors.iter().any(|s| !s.tried) {
+                            return None;
+                        }
+                        self.phase = Phase::Between {
+                            began: now,
+                            stepped: false,
+                        };
+                    }
+                }
+                Phase::Reading { .. } => {
+                    if let Some(frame) = self.finish_scan(now) {
+                        return Some(frame);
+                    }
+                    if self.start_sample(now) {
+                        return None;
+                    }
+                }
+                Phase::Between { began, stepped } => {
+                    if !stepped && self.begin_step(now) {
+                        self.phase = Phase::Between {
+                            began,
+                            stepped: true,
+                        };
+                    } else if !self.begin_scan(began, now) {
+                        return None;
+                    }
+                }
+            }
+        }
+        None
+    }
+
+    /// Picks the sensor whose step has been due for longest; false if none is due.
+    fn begin_step(&mut self, now: Instant) -> bool {
+        let due = self
+            .sensors
+            .iter()
+            .enumerate()
+            .filter(|(_, s)| s.is_due(now));
+        let Some((k, sensor)) = due.min_by_key(|(_, s)| s.due) else {
+            return false;
+        };
+        let Some(step) = sensor.step else {
+            return false;
+        };
+        let bring_up = BringUp::new(step, imu::address(k), self.config.imu);
+        self.step = Some(ActiveStep {
+            sensor: k,
+            bring_up,
+        });
+        true
+    }
+
+    /// Starts the step's next transaction, or ends it. True if a transaction was started or nothing can be.
+    fn advance_step(&mut self, now: Instant) -> bool {
+        let Some(active) = &self.step else {
+            return false;
+        };
+        let (k, step) = (active.sensor, active.bring_up.step());
+        match active.bring_up.next() {
+            Next::Transaction(transaction) => self.start_step(k, transaction, now),
+            Next::Done(outcome) => {
+                self.step = None;
+                if let Some(sensor) = self.sensors.get_mut(k)
+                    && sensor.step_done(step, outcome, now)
+                    && let Some(starts) = self.counters.starts.get_mut(k)
+                {
+                    *starts = starts.wrapping_add(1);
+                }
+                false
+            }
+            Next::Failed(error) => {
+                self.fail_step(error, now);
+                false
+            }
+        }
+    }
+
+    fn start_step(&mut self, k: usize, transaction: Transaction, now: Instant) -> bool {
+        let mut batch = Batch::new();
+        let channel = imu::channel(k);
+        let job = if self.mux.selected() == Some(channel) {
+            let _ = batch.push(transaction);
+            Job::Step
+        } else {
+            if let Err(cause) = self.mux.select(channel, &mut batch) {
+                self.fail_step(imu::Error::Mux(cause), now);
+                return false;
+            }
+            Job::Select { sensor: k }
+        };
+        match self.bus.start(&batch, now) {
+            Ok(()) => self.job = Some(job),
+            Err(cause) => self.fail_step(imu::Error::Mux(cause), now),
+        }
+        true
+    }
+
+    /// Begins a scan if its time has come and there is a sensor to read.
+    fn begin_scan(&mut self, began: Instant, now: Instant) -> bool {
+        let first = self.counters.frames == 0;
+        let due = first || now >= after(began, self.config.period);
+        if !due || !self.sensors.iter().any(Sensor::is_running) {
+            // Another step may come due before the next scan.
+            self.phase = Phase::Between {
+                began,
+                stepped: false,
+            };
+            return false;
+        }
+        self.phase = Phase::Reading {
+            next: 0,
+            began: now,
+        };
+        true
+    }
+
+    /// Starts the next sensor's sample. False if there is none left, or it could not be started.
+    fn start_sample(&mut self, now: Instant) -> bool {
+        let Phase::Reading { next, began } = self.phase else {
+            return false;
+        };
+        let Some(k) = (next..SEGMENT_COUNT).find(|&k| self.sensors[k].is_running()) else {
+            return false;
+        };
+        self.phase = Phase::Reading { next: k + 1, began };
+        let plain = self.sensors[k].reads_plain();
+        let mut batch = Batch::new();
+        let selects = self.mux.selected() != Some(imu::channel(k));
+        let started = sample_batch(k, plain)
+            .and_then(|sample| {
+                if selects {
+                    self.mux.select(imu::channel(k), &mut batch)?;
+                }
+                batch.push(sample).map_err(|_| Error::Unsupported)
+            })
+            .and_then(|()| self.bus.start(&batch, now));
+        match started {
+            Ok(()) => {
+                self.job = Some(Job::Sample {
+                    sensor: k,
+                    stamp: now,
+                    selects,
+                    plain,
+                })
+            }
+            Err(cause) => self.sensors[k].miss(cause, now, &mut self.counters),
+        }
+        true
+    }
+
+    /// If no sensor is left to read: closes the scan.
+    fn finish_scan(&mut self, now: Instant) -> Option<Frame> {
+        let Phase::Reading { next, began } = self.phase else {
+            return None;
+        };
+        if (next..SEGMENT_COUNT).any(|k| self.sensors[k].is_running()) {
+            return None;
+        }
+        self.phase = Phase::Between {
+            began,
+            stepped: false,
+        };
+        let frozen = self.frozen.check(&self.sensors, now);
+        for (k, sensor) in self.sensors.iter_mut().enumerate() {
+            if frozen >> k & 1 == 1 {
+                sensor.freeze(now, &mut self.counters);
+            }
+        }
+        let sequence = self.counters.frames;
+        self.counters.frames = sequence.wrapping_add(1);
+        Some(Frame {
+            samples: core::array::from_fn(|k| self.sensors[k].sample()),
+            sequence,
+        })
+    }
+}
+
+/// The 8-byte read, alone if the register pointer stands where it should.
+fn sample_batch(k: usize, plain: bool) -> Result<Transaction, Error> {
+    if plain {
+        Transaction::read(imu::address(k), SAMPLE_BYTES)
+    } else {
+        Transaction::write_read(imu::address(k), &[register::QUATERNION], SAMPLE_BYTES)
+    }
+}

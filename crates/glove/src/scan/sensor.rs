@@ -1,0 +1,304 @@
+//! What the scanner knows of one sensor, and how samples and failures change it.
+
+use super::{Counters, Health, Sample};
+use crate::bus;
+use crate::hand::Quaternion;
+use crate::imu::bringup::{Outcome, Step, retry_at};
+use crate::imu::{self, Error, Fault};
+use crate::timing::{self, after, since};
+use crate::{Duration, Instant};
+
+/// Bad samples in a row after which the sensor is asked what it is doing.
+const BAD_MAX: u8 = 3;
+
+/// Rechecks in a row without a good sample after which it is brought up again.
+const RECHECKS_MAX: u8 = 3;
+
+/// Plain reads in a row that brought nothing good although the pointer was written: then the pointer does not stay.
+const PLAIN_MAX: u8 = 3;
+
+/// One sensor.
+#[derive(Debug, Clone)]
+pub(super) struct Sensor {
+    /// The next step of its bring-up; `None`: it is sampled.
+    pub step: Option<Step>,
+    /// When that step is due.
+    pub due: Instant,
+    /// What to tell.
+    pub health: Health,
+    /// The raw bytes of the newest sample, if it was read.
+    pub raw: Option<[u8; imu::SAMPLE_BYTES]>,
+    /// The register pointer is known to stand at the quaternion.
+    pub pointer_set: bool,
+    /// Whether its first bring-up has ended, well or not.
+    pub tried: bool,
+    /// It is frozen, or was and has not changed since: not believed until its bytes change.
+    pub distrusted: Option<[u8; imu::SAMPLE_BYTES]>,
+    good: Option<(Quaternion, Instant)>,
+    /// Good samples since it came up.
+    fresh: bool,
+    up_since: Instant,
+    tries: u8,
+    failures: u8,
+    bad: u8,
+    rechecks: u8,
+    plain_failures: u8,
+}
+
+impl Sensor {
+    pub fn new() -> Self {
+        Self {
+            step: Some(Step::Identify),
+            due: Instant::from_ticks(0),
+            health: Health::Starting,
+            raw: None,
+            pointer_set: false,
+            tried: false,
+            distrusted: None,
+            good: None,
+            fresh: false,
+            up_since: Instant::from_ticks(0),
+            tries: 0,
+            failures: 0,
+            bad: 0,
+            rechecks: 0,
+            plain_failures: 0,
+        }
+    }
+
+    pub fn is_running(&self) -> bool {
+        self.step.is_none()
+    }
+
+    /// Whether a step of its bring-up is due.
+    pub fn is_due(&self, now: Instant) -> bool {
+        self.step.is_some() && now >= self.due
+    }
+
+    /// Whether the next sample may be read without writing the register pointer.
+    pub fn reads_plain(&self) -> bool {
+        self.pointer_set && self.plain_failures < PLAIN_MAX
+    }
+
+    pub fn sample(&self) -> Sample {
+        let (orientation, stamp) = self
+            .good
+            .unwrap_or((Quaternion::identity(), Instant::from_ticks(0)));
+        Sample {
+            orientation,
+            stamp,
+            health: self.health,
+        }
+    }
+
+    /// Eight bytes arrived that were asked for at `stamp`, by a plain read or not.
+    pub fn take(
+        &mut self,
+        raw: [u8; imu::SAMPLE_BYTES],
+        stamp: Instant,
+        plain: bool,
+        counters: &mut Counters,
+    ) {
+        self.raw = Some(raw);
+        self.pointer_set = true;
+        match self.judge(&raw, stamp) {
+            Ok(orientation) => {
+                let orientation = match self.good {
+                    Some((previous, _)) => imu::continuous(orientation, &previous),
+                    None => orientation,
+                };
+                self.good = Some((orientation, stamp));
+                self.fresh = true;
+                self.distrusted = None;
+                self.health = Health::Good;
+                (self.bad, self.rechecks, self.failures, self.tries) = (0, 0, 0, 0);
+                if plain {
+                    self.plain_failures = 0;
+                }
+                counters.good = counters.good.wrapping_add(1);
+            }
+            Err(fault) => self.reject(fault, stamp, plain, counters),
+        }
+    }
+
+    fn judge(&self, raw: &[u8; imu::SAMPLE_BYTES], stamp: Instant) -> Result<Quaternion, Fault> {
+        let orientation = imu::orientation(raw)?;
+        if self.distrusted == Some(*raw) {
+            return Err(Fault::Frozen);
+        }
+        match self.good {
+            Some((previous, at))
+                if self.fresh && !imu::is_reachable(&previous, &orientation, since(stamp, at)) =>
+            {
+                Err(Fault::TooFast)
+            }
+            _ => Ok(orientation),
+        }
+    }
+
+    fn reject(&mut self, fault: Fault, now: Instant, plain: bool, counters: &mut Counters) {
+        if fault == Fault::Zero && !self.fresh {
+            self.await_first(now);
+            return;
+        }
+        count(fault, counters);
+        self.health = Health::Rejected(fault);
+        match fault {
+            // Right bytes of the right register, only not to be believed: time mends these.
+            Fault::TooFast => return,
+            Fault::Frozen => {
+                if since(now, self.up_since) >= timing::FROZEN_RESTART {
+                    self.restart(Error::Rejected(fault), now);
+                }
+                return;
+            }
+            Fault::Zero | Fault::NotUnit | Fault::Restarted => {}
+        }
+        self.pointer_set = false;
+        if plain {
+            self.plain_failures = self.plain_failures.saturating_add(1);
+        }
+        self.bad = self.bad.saturating_add(1);
+        if fault == Fault::Restarted || self.bad >= BAD_MAX {
+            self.recheck(Error::Rejected(fault), now);
+        }
+    }
+
+    /// All-zero bytes before the first output are no fault, for a while.
+    fn await_first(&mut self, now: Instant) {
+        if since(now, self.up_since) < timing::FIRST_SAMPLE {
+            self.health = Health::Starting;
+        } else {
+            self.restart(Error::NoSample, now);
+        }
+    }
+
+    /// The scan found it frozen: its newest sample is withdrawn.
+    pub fn freeze(&mut self, now: Instant, counters: &mut Counters) {
+        if let (Some(raw), Health::Good) = (self.raw, self.health) {
+            self.distrusted = Some(raw);
+            self.up_since = now;
+            self.health = Health::Rejected(Fault::Frozen);
+            count(Fault::Frozen, counters);
+        }
+    }
+
+    /// A sample did not come.
+    pub fn miss(&mut self, cause: bus::Error, now: Instant, counters: &mut Counters) {
+        let error = Error::Bus {
+            register: imu::register::QUATERNION,
+            cause,
+        };
+        counters.missed = counters.missed.wrapping_add(1);
+        self.health = Health::Missing(error);
+        self.raw = None;
+        self.pointer_set = false;
+        if !is_sensors(cause) {
+            return;
+        }
+        self.bad = self.bad.saturating_add(1);
+        if cause.is_nack() || self.bad >= BAD_MAX {
+            self.recheck(error, now);
+        }
+    }
+
+    fn recheck(&mut self, error: Error, now: Instant) {
+        self.bad = 0;
+        self.rechecks = self.rechecks.saturating_add(1);
+        if self.rechecks > RECHECKS_MAX {
+            self.restart(error, now);
+        } else {
+            (self.step, self.due, self.tries) = (Some(Step::Recheck), now, 0);
+        }
+    }
+
+    /// Starts over, at once the first time, later and later after that.
+    fn restart(&mut self, error: Error, now: Instant) {
+        self.health = match error {
+            Error::Rejected(fault) => Health::Rejected(fault),
+            other => Health::Missing(other),
+        };
+        let doubled = timing::BACKOFF_MIN.as_ticks() << self.failures.min(8);
+        let wait = Duration::from_ticks(doubled.min(timing::BACKOFF_MAX.as_ticks()));
+        self.failures = self.failures.saturating_add(1);
+        (self.step, self.due) = (Some(Step::Identify), after(now, wait));
+        (self.tries, self.bad, self.rechecks, self.tried) = (0, 0, 0, true);
+        self.forget();
+    }
+
+    /// Its register pointer is not known any more.
+    pub fn forget(&mut self) {
+        self.pointer_set = false;
+        self.raw = None;
+    }
+
+    /// A step of its bring-up ended well; true when the sensor is up after a real start.
+    pub fn step_done(&mut self, step: Step, outcome: Outcome, now: Instant) -> bool {
+        self.tries = 0;
+        self.forget();
+        self.due = after(now, outcome.pause);
+        self.step = outcome.next;
+        if step == Step::Recheck && outcome.next.is_some() {
+            // Its fusion has started anew, so the next orientation has nothing to do with the last.
+            self.fresh = false;
+        }
+        if outcome.next.is_some() {
+            return false;
+        }
+        self.tried = true;
+        if step == Step::Recheck {
+            return false;
+        }
+        self.fresh = false;
+        self.up_since = now;
+        self.plain_failures = 0;
+        self.health = Health::Starting;
+        true
+    }
+
+    /// A step failed; true when its bring-up starts over.
+    pub fn step_failed(&mut self, step: Step, error: Error, now: Instant) -> bool {
+        self.forget();
+        if let Error::Bus { cause, .. } | Error::Mux(cause) = error
+            && !is_sensors(cause)
+        {
+            // The way to the sensor failed: the same step again when the way is there.
+            self.due = after(now, timing::STEP_RETRY);
+            return false;
+        }
+        if !matches!(self.health, Health::Starting) || self.tried {
+            self.health = Health::Missing(error);
+        }
+        self.tries = self.tries.saturating_add(1);
+        let hopeless = matches!(error, Error::ChipId(_));
+        match retry_at(step, self.tries, now).filter(|_| !hopeless) {
+            Some(due) => {
+                self.due = due;
+                false
+            }
+            None => {
+                self.restart(error, now);
+                true
+            }
+        }
+    }
+}
+
+/// Whether a bus error may be the sensor's (or the multiplexer's) doing, rather than the serial bridge's.
+fn is_sensors(cause: bus::Error) -> bool {
+    !matches!(
+        cause,
+        bus::Error::NoAnswer | bus::Error::Port | bus::Error::Busy
+    )
+}
+
+fn count(fault: Fault, counters: &mut Counters) {
+    let counter = match fault {
+        Fault::Zero => &mut counters.zero,
+        Fault::NotUnit => &mut counters.not_unit,
+        Fault::Restarted => &mut counters.restarted,
+        Fault::TooFast => &mut counters.too_fast,
+        Fault::Frozen => &mut counters.frozen,
+    };
+    *counter = counter.wrapping_add(1);
+}

@@ -1,0 +1,783 @@
+use super::*;
+use crate::bus::{self, Batch, Direct, Reply};
+use crate::hand::segment_orientations;
+use crate::imu::{Fault, Mode};
+use embedded_hal::i2c::{ErrorKind, NoAcknowledgeSource};
+use embedded_hal_mock::eh1::i2c::{Mock, Transaction as Expect};
+
+extern crate std;
+use std::boxed::Box;
+use std::vec;
+use std::vec::Vec;
+
+/// A sensor as the scanner's tests need it: a few registers, a boot time, and faults on demand.
+struct Chip {
+    mode: u8,
+    pointer: u8,
+    boot_until: u64,
+    units: u8,
+    present: bool,
+    resets: u32,
+    /// Bytes to give instead of the quaternion, for so many reads.
+    instead: Option<([u8; 8], u32)>,
+    frozen: Option<[u8; 8]>,
+    fusion_from: u64,
+}
+
+/// The bus, the multiplexer and 16 chips; a batch takes 1 ms, a read that fails 30 ms, as behind the serial bridge.
+struct Fake {
+    chips: Vec<Chip>,
+    channels: u8,
+    mux_deaf: bool,
+    up: bool,
+    pose: Box<dyn FnMut(u64, usize) -> Quaternion>,
+    due: Option<(u64, Result<Reply, bus::Error>)>,
+    batches: u32,
+}
+
+impl Fake {
+    fn new(pose: impl FnMut(u64, usize) -> Quaternion + 'static) -> Self {
+        let chip = |_| Chip {
+            mode: 0x0C,
+            pointer: 0,
+            boot_until: 0,
+            units: 0x80,
+            present: true,
+            resets: 0,
+            instead: None,
+            frozen: None,
+            fusion_from: 0,
+        };
+        Self {
+            chips: (0..16).map(chip).collect(),
+            channels: 0,
+            mux_deaf: false,
+            up: true,
+            pose: Box::new(pose),
+            due: None,
+            batches: 0,
+        }
+    }
+
+    fn run(&mut self, batch: &Batch, now: u64) -> Result<Reply, bus::Error> {
+        let mut reply = Reply::new();
+        for t in batch {
+            if t.address() == 0x70 {
+                if let ([channels], false) = (t.bytes(), self.mux_deaf) {
+                    self.channels = *channels;
+                }
+                if t.count() == 1 {
+                    reply.push(self.channels).unwrap();
+                }
+                continue;
+            }
+            assert_eq!(
+                self.channels.count_ones(),
+                1,
+                "two channels at a time, or none"
+            );
+            let k = 2 * self.channels.trailing_zeros() as usize + usize::from(t.address() - 0x28);
+            let quaternion = (self.pose)(now, k);
+            let chip = &mut self.chips[k];
+            if !chip.present || now < chip.boot_until {
+                return Err(bus::Error::NackAddress);
+            }
+            if let [register, values @ ..] = t.bytes() {
+                chip.pointer = *register;
+                for value in values {
+                    chip.write(*register, *value, now);
+                }
+            }
+            if t.count() > 0 {
+                reply
+                    .extend_from_slice(&chip.read(t.count(), &quaternion, now))
+                    .unwrap();
+            }
+        }
+        Ok(reply)
+    }
+}
+
+impl Chip {
+    fn write(&mut self, register: u8, value: u8, now: u64) {
+        match (register, self.mode) {
+            (0x3D, _) => {
+                self.mode = value;
+                self.fusion_from = now + 20_000;
+            }
+            (0x3F, 0) if value & 0x20 != 0 => self.reset(now),
+            (0x3B, 0) => self.units = value,
+            _ => {}
+        }
+    }
+
+    fn reset(&mut self, now: u64) {
+        self.resets += 1;
+        (self.mode, self.pointer, self.boot_until) = (0, 0, now + 650_000);
+    }
+
+    fn read(&mut self, count: usize, q: &Quaternion, now: u64) -> Vec<u8> {
+        match self.pointer {
+            0x00 => [0xA0, 0xFB, 0x32, 0x0F, 0x11, 0x03, 0x15, 0x00][..count].to_vec(),
+            0x20 if self.mode == 0 || now < self.fusion_from => vec![0; 8],
+            0x20 => {
+                if let Some((bytes, left)) = self.instead.take() {
+                    self.instead = (left > 1).then_some((bytes, left - 1));
+                    return bytes.to_vec();
+                }
+                let bytes = registers(q);
+                self.frozen.unwrap_or(bytes).to_vec()
+            }
+            0x39 => vec![if self.mode == 0 { 0 } else { 5 }, 0],
+            0x3B => vec![self.units],
+            0x3D => vec![self.mode],
+            0x3E => vec![0],
+            other => panic!("register {other:#04X} read"),
+        }
+    }
+}
+
+fn registers(q: &Quaternion) -> [u8; 8] {
+    let mut bytes = [0; 8];
+    for (pair, v) in bytes.chunks_mut(2).zip([q.w, q.i, q.j, q.k]) {
+        pair.copy_from_slice(&(libm::roundf(v * 16_384.0) as i16).to_le_bytes());
+    }
+    bytes
+}
+
+impl Bus for Fake {
+    fn start(&mut self, batch: &Batch, now: Instant) -> Result<(), bus::Error> {
+        assert!(self.due.is_none(), "one at a time");
+        let result = self.run(batch, now.as_ticks());
+        let blind = batch.last().is_some_and(|t| t.count() > 0);
+        let takes = if result.is_err() && blind {
+            30_000
+        } else {
+            1_000
+        };
+        self.batches += 1;
+        self.due = Some((now.as_ticks() + takes, result));
+        Ok(())
+    }
+
+    fn poll(&mut self, now: Instant) -> Option<Result<Reply, bus::Error>> {
+        if !self.up {
+            return self.due.take().map(|_| Err(bus::Error::NoAnswer));
+        }
+        self.due
+            .take_if(|(at, _)| now.as_ticks() >= *at)
+            .map(|(_, result)| result)
+    }
+
+    fn next_due(&self) -> Option<Instant> {
+        self.due.as_ref().map(|(at, _)| Instant::from_ticks(*at))
+    }
+
+    fn is_up(&self) -> bool {
+        self.up
+    }
+
+    fn is_dead(&self) -> bool {
+        false
+    }
+}
+
+struct Run {
+    scanner: BusScanner<Fake>,
+    now: u64,
+}
+
+impl Run {
+    fn new(pose: impl FnMut(u64, usize) -> Quaternion + 'static) -> Self {
+        Self {
+            scanner: BusScanner::on(Fake::new(pose), Config::default()),
+            now: 0,
+        }
+    }
+
+    /// Frames until `end`, in µs.
+    fn until(&mut self, end: u64) -> Vec<Frame> {
+        let mut frames = Vec::new();
+        while self.now < end {
+            frames.extend(self.scanner.poll(Instant::from_ticks(self.now)));
+            let due = self.scanner.next_due().map_or(end, |d| d.as_ticks());
+            self.now = due.clamp(self.now + 10, end.max(self.now + 10));
+        }
+        frames
+    }
+
+    fn for_ms(&mut self, ms: u64) -> Vec<Frame> {
+        self.until(self.now + ms * 1_000)
+    }
+
+    fn chip(&mut self, k: usize) -> &mut Chip {
+        &mut self.scanner.bus_mut().chips[k]
+    }
+}
+
+/// A hand that turns slowly and bends its fingers: every sensor moves.
+fn moving(micros: u64, sensor: usize) -> Quaternion {
+    let t = micros as f32 * 1e-6;
+    let angles = core::array::from_fn(|j| 0.3 * libm::sinf(1.3 * t + j as f32));
+    let hand = Quaternion::from_euler_angles(0.5 * libm::sinf(t), 0.3 * libm::sinf(0.7 * t), t);
+    hand * segment_orientations(&angles, crate::hand::Side::Right)[sensor]
+}
+
+fn still(_: u64, _: usize) -> Quaternion {
+    Quaternion::identity()
+}
+
+const ALL: u16 = 0xFFFF;
+
+#[test]
+fn all_sensors_are_reset_before_the_one_wait_and_frames_come_soon_after() {
+    let mut run = Run::new(moving);
+    let frames = run.until(1_200_000);
+    assert!(frames.len() > 3, "{} frames", frames.len());
+    assert!(frames.iter().all(|f| f.good() == ALL), "{:?}", frames[0]);
+    assert_eq!(run.scanner.state(), State::Scanning);
+    assert_eq!(run.scanner.counters().starts, [1; 16]);
+    assert!((0..16).all(|k| run.chip(k).resets == 1 && run.chip(k).units == 0x00));
+    let sequence: Vec<u32> = frames.iter().map(|f| f.sequence).collect();
+    assert_eq!(sequence, (0..frames.len() as u32).collect::<Vec<_>>());
+}
+
+#[test]
+fn ndof_is_set_when_asked_for() {
+    let imu = imu::Config {
+        mode: Mode::Ndof,
+        external_crystal: false,
+    };
+    let mut run = Run::new(moving);
+    run.scanner = BusScanner::on(
+        Fake::new(moving),
+        Config {
+            imu,
+            ..Config::default()
+        },
+    );
+    assert!(!run.until(1_200_000).is_empty());
+    assert!((0..16).all(|k| run.chip(k).mode == 0x0C));
+}
+
+#[test]
+fn one_scan_is_16_batches_and_each_sample_is_stamped_when_it_was_asked_for() {
+    let mut run = Run::new(moving);
+    run.until(1_200_000);
+    let before = run.scanner.bus_mut().batches;
+    let first = run.scanner.counters().frames;
+    let frames = run.for_ms(160);
+    assert_eq!(
+        run.scanner.bus_mut().batches - before,
+        16 * (run.scanner.counters().frames - first)
+    );
+    let stamps = frames[5].samples.map(|s| s.stamp.as_ticks());
+    assert!(
+        stamps.windows(2).all(|w| w[1] == w[0] + 1_000),
+        "{stamps:?}"
+    );
+    let k = 6;
+    let expected = moving(stamps[k], k);
+    assert!(imu::angle_between(&frames[5].samples[k].orientation, &expected) < 2e-3);
+}
+
+#[test]
+fn the_sign_of_each_sensors_quaternion_is_continuous() {
+    let spin = |micros: u64, _| Quaternion::from_euler_angles(0.0, 0.0, micros as f32 * 3e-6);
+    let mut run = Run::new(move |micros, k| {
+        let q = spin(micros, k);
+        // The chip may give either sign.
+        if micros / 16_000 % 2 == 0 {
+            q
+        } else {
+            Quaternion::new_unchecked(-q.into_inner())
+        }
+    });
+    let frames = run.until(5_000_000);
+    for pair in frames.windows(2) {
+        let (a, b) = (
+            pair[0].samples[5].orientation,
+            pair[1].samples[5].orientation,
+        );
+        assert!(a.coords.dot(&b.coords) > 0.5);
+    }
+}
+
+#[test]
+fn a_sensor_that_is_absent_is_named_and_the_others_are_scanned() {
+    let mut run = Run::new(moving);
+    run.chip(9).present = false;
+    let frames = run.until(3_000_000);
+    let last = frames.last().unwrap();
+    assert_eq!(last.good(), ALL & !(1 << 9));
+    let cause = imu::Error::Bus {
+        register: 0x07,
+        cause: bus::Error::NackAddress,
+    };
+    assert_eq!(last.samples[9].health, Health::Missing(cause));
+    assert!(
+        frames.len() > 100,
+        "the absent one costs little: {} frames",
+        frames.len()
+    );
+    // Plugged in later, it comes up by itself.
+    run.chip(9).present = true;
+    assert_eq!(run.for_ms(3_500).last().unwrap().good(), ALL);
+}
+
+#[test]
+fn a_sensor_that_falls_silent_is_rechecked_and_comes_back_without_a_reset() {
+    let mut run = Run::new(moving);
+    run.until(1_200_000);
+    run.chip(4).present = false;
+    let out = run.for_ms(100);
+    assert!(out.last().unwrap().good() == ALL & !(1 << 4));
+    run.chip(4).present = true;
+    assert_eq!(run.for_ms(100).last().unwrap().good(), ALL);
+    assert_eq!(run.chip(4).resets, 1, "only the one of the bring-up");
+    assert_eq!(run.scanner.counters().starts[4], 1);
+}
+
+#[test]
+fn a_sensor_that_resets_itself_is_brought_up_alone_while_the_others_go_on() {
+    let mut run = Run::new(moving);
+    run.until(1_200_000);
+    let now = run.now;
+    run.chip(11).reset(now);
+    let frames = run.for_ms(650 + 300);
+    assert!(
+        frames.iter().all(|f| f.good() | 1 << 11 == ALL),
+        "no other sensor suffers"
+    );
+    assert!(frames.len() > 40, "{} frames", frames.len());
+    let longest = frames
+        .windows(2)
+        .map(|w| w[1].samples[0].stamp - w[0].samples[0].stamp)
+        .max();
+    assert!(longest.unwrap().as_ticks() < 60_000, "{longest:?}");
+    assert_eq!(frames.last().unwrap().good(), ALL);
+    assert_eq!(
+        run.scanner.counters().starts[11],
+        2,
+        "its heading is new: said so"
+    );
+    assert_eq!(run.scanner.counters().starts[10], 1);
+}
+
+#[test]
+fn the_chips_identification_in_place_of_a_sample_is_taken_for_a_restart() {
+    let mut run = Run::new(moving);
+    run.until(1_200_000);
+    // Reset and booted again between two reads: pointer 0, mode CONFIG.
+    let now = run.now;
+    let chip = run.chip(3);
+    chip.reset(now);
+    chip.boot_until = 0;
+    let frames = run.for_ms(200);
+    let restarted = Health::Rejected(Fault::Restarted);
+    assert!(frames.iter().any(|f| f.samples[3].health == restarted));
+    assert_eq!(frames.last().unwrap().good(), ALL);
+    assert_eq!(run.scanner.counters().starts[3], 2);
+}
+
+#[test]
+fn bad_samples_are_rejected_and_the_last_good_one_keeps_its_stamp() {
+    let flipped = [0x00, 0x20, 0x00, 0xA0, 0x00, 0x20, 0x00, 0x20];
+    // 170° away from anything near identity, unit.
+    let far = [0x94, 0x05, 0x00, 0x00, 0xC1, 0x3F, 0x00, 0x00];
+    for (bytes, fault) in [
+        (flipped, Fault::NotUnit),
+        ([0; 8], Fault::Zero),
+        (far, Fault::TooFast),
+    ] {
+        let mut run = Run::new(still);
+        run.until(1_200_000);
+        run.chip(8).instead = Some((bytes, 1));
+        let frames = run.for_ms(100);
+        let index = frames.iter().position(|f| f.good() != ALL).unwrap();
+        let (before, bad) = (
+            frames[index.max(1) - 1].samples[8],
+            frames[index].samples[8],
+        );
+        assert_eq!(bad.health, Health::Rejected(fault));
+        if index > 0 {
+            assert_eq!(
+                (bad.orientation, bad.stamp),
+                (before.orientation, before.stamp)
+            );
+        }
+        assert_eq!(
+            frames.iter().filter(|f| f.good() != ALL).count(),
+            1,
+            "{fault:?}: one sample lost"
+        );
+        assert_eq!(run.chip(8).resets, 1);
+    }
+}
+
+#[test]
+fn a_sensor_that_stays_bad_is_brought_up_again_ever_more_rarely() {
+    let mut run = Run::new(moving);
+    run.until(1_200_000);
+    run.chip(2).instead = Some(([0x11; 8], u32::MAX));
+    let frames = run.for_ms(20_000);
+    assert!(frames.iter().skip(5).all(|f| f.good() == ALL & !(1 << 2)));
+    let resets = run.chip(2).resets;
+    assert!((5..15).contains(&resets), "{resets} resets in 20 s");
+    assert!(frames.len() > 1_000);
+}
+
+#[test]
+fn a_hand_held_still_is_not_frozen_nor_a_finger_that_rests() {
+    let mut run = Run::new(still);
+    assert!(run.until(5_000_000).iter().all(|f| f.good() == ALL));
+    // Only the index moves; 13 sensors give the very same bytes for seconds.
+    let index = |micros: u64, k: usize| {
+        let mut angles = [0.0; 25];
+        angles[5] = 0.8 + 0.8 * libm::sinf(micros as f32 * 2e-6);
+        segment_orientations(&angles, crate::hand::Side::Right)[k]
+    };
+    let mut run = Run::new(index);
+    assert!(run.until(10_000_000).iter().all(|f| f.good() == ALL));
+}
+
+#[test]
+fn a_sensor_whose_parent_turns_while_its_bytes_stand_still_is_frozen() {
+    let mut run = Run::new(moving);
+    run.until(1_500_000);
+    let stuck = registers(&moving(run.now, 5));
+    run.chip(5).frozen = Some(stuck);
+    let frames = run.for_ms(900);
+    let from = frames.iter().position(|f| f.good() != ALL).unwrap();
+    assert!((450_000..800_000).contains(&(frames[from].samples[0].stamp.as_ticks() - 1_500_000)));
+    assert!(
+        frames[from..]
+            .iter()
+            .all(|f| f.samples[5].health == Health::Rejected(Fault::Frozen))
+    );
+    assert!(
+        frames.iter().all(|f| f.good() | 1 << 5 == ALL),
+        "its neighbours are not blamed"
+    );
+    // It is restarted, and believed again only when it moves.
+    let frames = run.for_ms(4_000);
+    assert!(frames.iter().all(|f| f.samples[5].health != Health::Good));
+    assert!(run.chip(5).resets > 1);
+    run.chip(5).frozen = None;
+    assert_eq!(run.for_ms(4_000).last().unwrap().good(), ALL);
+}
+
+#[test]
+fn a_sensor_that_always_flickered_and_stops_while_others_turn_is_frozen() {
+    // The hand stands still in the world; every sensor flickers by one count; the little finger moves.
+    let flickering = |micros: u64, k: usize| {
+        let mut angles = [0.0; 25];
+        angles[20] = 0.7 + 0.7 * libm::sinf(micros as f32 * 4e-6);
+        let mut q = segment_orientations(&angles, crate::hand::Side::Right)[k].into_inner();
+        q.k += if (micros / 10_000).is_multiple_of(2) {
+            1.0 / 16_384.0
+        } else {
+            0.0
+        };
+        Quaternion::new_unchecked(q)
+    };
+    let mut run = Run::new(flickering);
+    assert!(run.until(4_000_000).iter().all(|f| f.good() == ALL));
+    let stuck = registers(&flickering(run.now, 4));
+    run.chip(4).frozen = Some(stuck);
+    let frames = run.for_ms(1_200);
+    assert!(frames.iter().all(|f| f.good() | 1 << 4 == ALL));
+    assert_eq!(
+        frames.last().unwrap().samples[4].health,
+        Health::Rejected(Fault::Frozen)
+    );
+}
+
+#[test]
+fn the_hand_sensor_is_frozen_when_everything_on_it_turns_as_one() {
+    // The hand turns as a whole, fingers still in it.
+    let whole = |micros: u64, _| Quaternion::from_euler_angles(0.0, micros as f32 * 0.5e-6, 0.0);
+    let mut run = Run::new(whole);
+    run.until(1_500_000);
+    let stuck = registers(&whole(run.now, 0));
+    run.chip(0).frozen = Some(stuck);
+    let frames = run.for_ms(1_000);
+    assert_eq!(
+        frames.last().unwrap().samples[0].health,
+        Health::Rejected(Fault::Frozen)
+    );
+    assert_eq!(frames.last().unwrap().good(), ALL & !1);
+}
+
+#[test]
+fn a_selection_that_did_not_take_never_lets_another_fingers_sample_through() {
+    let mut run = Run::new(|_, k| Quaternion::from_euler_angles(0.1 * k as f32, 0.0, 0.0));
+    run.until(1_200_000);
+    run.scanner.bus_mut().mux_deaf = true;
+    let frames = run.for_ms(60);
+    for frame in &frames {
+        for (k, sample) in frame.samples.iter().enumerate() {
+            let own = Quaternion::from_euler_angles(0.1 * k as f32, 0.0, 0.0);
+            assert!(
+                imu::angle_between(&sample.orientation, &own) < 1e-3,
+                "sensor {k}"
+            );
+        }
+    }
+    assert!(run.scanner.counters().mux_errors > 0);
+    run.scanner.bus_mut().mux_deaf = false;
+    assert_eq!(run.for_ms(3_000).last().unwrap().good(), ALL);
+}
+
+#[test]
+fn a_dead_link_costs_nothing_but_its_state_and_the_sensors_are_not_blamed() {
+    let mut run = Run::new(moving);
+    run.until(1_200_000);
+    run.scanner.bus_mut().up = false;
+    let before = run.scanner.bus_mut().batches;
+    let frames = run.for_ms(2_000);
+    assert!(frames.len() <= 1);
+    assert_eq!(
+        (run.scanner.state(), run.scanner.bus_mut().batches),
+        (State::Resync, before)
+    );
+    run.scanner.bus_mut().up = true;
+    let frames = run.for_ms(100);
+    assert_eq!(frames.last().unwrap().good(), ALL);
+    assert!(
+        (0..16).all(|k| run.chip(k).resets == 1),
+        "no sensor is brought up again"
+    );
+}
+
+#[test]
+fn a_missing_multiplexer_is_told_from_missing_sensors() {
+    let mut run = Run::new(moving);
+    run.scanner.bus_mut().mux_deaf = true;
+    assert!(run.until(3_000_000).is_empty());
+    assert_eq!(run.scanner.state(), State::Starting);
+    let mux = Health::Missing(imu::Error::Mux(bus::Error::Status(0)));
+    assert_eq!(run.scanner.health(), [mux; 16]);
+}
+
+#[test]
+fn a_period_keeps_scans_apart() {
+    let mut run = Run::new(moving);
+    let config = Config {
+        period: Duration::from_ticks(50_000),
+        ..Config::default()
+    };
+    run.scanner = BusScanner::on(Fake::new(moving), config);
+    let frames = run.until(3_000_000);
+    let gaps = frames
+        .windows(2)
+        .map(|w| (w[1].samples[0].stamp - w[0].samples[0].stamp).as_ticks());
+    assert!(
+        gaps.clone().all(|gap| (50_000..51_000).contains(&gap)),
+        "{:?}",
+        gaps.collect::<Vec<_>>()
+    );
+}
+
+#[test]
+fn one_scan_on_a_scripted_bus_is_exactly_these_transactions() {
+    let mut script = bring_up_of_all();
+    script.extend(first_scan());
+    // The second scan reads without writing the register pointer; the first selection of channel 2 does not take.
+    script.extend(second_scan());
+    // The third begins as the second ends.
+    script.extend(select(0, 0x01));
+    script.push(Expect::read(0x28, ONE.to_vec()));
+    let frames = run_script(&script, 2);
+    assert_eq!(frames[0].good(), ALL);
+    // The failed selection loses sensor 4's sample; sensor 5 selects anew and is read.
+    assert_eq!(frames[1].good(), ALL & !(1 << 4));
+    let wrong = imu::Error::Bus {
+        register: 0x20,
+        cause: bus::Error::Status(0x02),
+    };
+    assert_eq!(frames[1].samples[4].health, Health::Missing(wrong));
+}
+
+#[test]
+fn a_selection_that_is_not_acknowledged_is_forgotten() {
+    let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Address);
+    let mut script = bring_up_of_all();
+    script.push(Expect::write(0x70, vec![0x01]).with_error(nack));
+    // Sensor 1 does not rely on channel 0.
+    script.extend(select(0, 0x01));
+    script.extend(first_scan().into_iter().skip(3));
+    // Sensor 0 is rechecked between the scans, on a channel selected anew.
+    script.extend(select(0, 0x01));
+    let frames = run_script(&script, 1);
+    assert_eq!(frames[0].good(), ALL & !1);
+    let cause = imu::Error::Bus {
+        register: 0x20,
+        cause: bus::Error::NackAddress,
+    };
+    assert_eq!(frames[0].samples[0].health, Health::Missing(cause));
+}
+
+/// Runs a scanner on a scripted I²C bus until it has given so many frames; the script must be used up.
+fn run_script(script: &[Expect], count: usize) -> Vec<Frame> {
+    let mut scanner = BusScanner::on(Direct::new(Mock::new(script)), Config::default());
+    let mut frames = Vec::new();
+    let mut now = 0;
+    while frames.len() < count {
+        frames.extend(scanner.poll(Instant::from_ticks(now)));
+        now = scanner
+            .next_due()
+            .map_or(0, |due| due.as_ticks())
+            .max(now + 1);
+        assert!(now < 2_000_000);
+    }
+    scanner.into_bus().release().done();
+    frames
+}
+
+fn select(channel: u8, read_back: u8) -> [Expect; 2] {
+    [
+        Expect::write(0x70, vec![1 << channel]),
+        Expect::read(0x70, vec![read_back]),
+    ]
+}
+
+/// The bring-up of 16 sensors: every step for all of them in turn, each sensor's after its channel's selection.
+fn bring_up_of_all() -> Vec<Expect> {
+    let mut script = Vec::new();
+    let mut selected = None;
+    let mut step = |lines: &dyn Fn(u8) -> Vec<Expect>| {
+        for k in 0..16u8 {
+            if selected != Some(k / 2) {
+                script.extend(select(k / 2, 1 << (k / 2)));
+                selected = Some(k / 2);
+            }
+            script.extend(lines(0x28 + k % 2));
+        }
+    };
+    let page = |a| Expect::write(a, vec![7, 0]);
+    let read = |a, r, v: u8| Expect::write_read(a, vec![r], vec![v]);
+    let write = |a, r, v| Expect::write(a, vec![r, v]);
+    step(&|a| vec![page(a), read(a, 0, 0xA0), page(a), read(a, 0x3D, 0)]);
+    step(&|a| vec![page(a), write(a, 0x3F, 0x20)]);
+    step(&|a| {
+        let mut lines = vec![
+            page(a),
+            read(a, 0, 0xA0),
+            page(a),
+            write(a, 0x3E, 0),
+            page(a),
+        ];
+        lines.extend([write(a, 0x3F, 0), page(a), read(a, 0x3E, 0)]);
+        lines.extend([
+            write(a, 0x3B, 0),
+            read(a, 0x3B, 0),
+            page(a),
+            write(a, 0x3D, 8),
+        ]);
+        lines
+    });
+    step(&|a| {
+        vec![
+            page(a),
+            read(a, 0x3D, 8),
+            Expect::write_read(a, vec![0x39], vec![5, 0]),
+        ]
+    });
+    script
+}
+
+/// The identity, as registers.
+const ONE: [u8; 8] = [0x00, 0x40, 0, 0, 0, 0, 0, 0];
+
+/// Every channel selected and read back, every register pointer written.
+fn first_scan() -> Vec<Expect> {
+    let mut script = Vec::new();
+    for k in 0..16u8 {
+        if k % 2 == 0 {
+            script.extend(select(k / 2, 1 << (k / 2)));
+        }
+        script.push(Expect::write_read(0x28 + k % 2, vec![0x20], ONE.to_vec()));
+    }
+    script
+}
+
+/// Plain reads; the selection for sensor 4 reads back another channel.
+fn second_scan() -> Vec<Expect> {
+    let mut script = Vec::new();
+    for k in 0..16u8 {
+        if k % 2 == 0 || k == 5 {
+            script.extend(select(k / 2, if k == 4 { 0x02 } else { 1 << (k / 2) }));
+        }
+        script.push(Expect::read(0x28 + k % 2, ONE.to_vec()));
+    }
+    script
+}
+
+#[test]
+fn random_replies_never_panic_and_never_make_an_orientation_that_is_not_unit() {
+    struct Noise(u64, bool);
+    impl Noise {
+        fn next(&mut self) -> u64 {
+            self.0 ^= self.0 << 13;
+            self.0 ^= self.0 >> 7;
+            self.0 ^= self.0 << 17;
+            self.0
+        }
+    }
+    impl Bus for Noise {
+        fn start(&mut self, _: &Batch, _: Instant) -> Result<(), bus::Error> {
+            if self.next().is_multiple_of(50) {
+                Err(bus::Error::NoAnswer)
+            } else {
+                Ok(())
+            }
+        }
+        fn poll(&mut self, _: Instant) -> Option<Result<Reply, bus::Error>> {
+            let length = self.next() as usize % 20;
+            match self.next() % 8 {
+                0 => None,
+                1 => Some(Err(bus::Error::NackAddress)),
+                2 => Some(Err(bus::Error::Lost {
+                    expected: 8,
+                    received: 1,
+                })),
+                _ => {
+                    // Plausible bytes as often as wild ones, so that every state is reached.
+                    let likely = [0xA0, 0x00, 0x05, 0x08, 0x01, 0x40];
+                    let byte = |r: u64| {
+                        if r & 1 == 0 {
+                            likely[(r >> 1) as usize % 6]
+                        } else {
+                            (r >> 8) as u8
+                        }
+                    };
+                    Some(Ok((0..length).map(|_| byte(self.next())).collect()))
+                }
+            }
+        }
+        fn next_due(&self) -> Option<Instant> {
+            None
+        }
+        fn is_up(&self) -> bool {
+            self.1 || !self.0.is_multiple_of(16)
+        }
+        fn is_dead(&self) -> bool {
+            false
+        }
+    }
+    for seed in 1..40 {
+        let mut scanner =
+            BusScanner::on(Noise(seed * 0x9E37_79B9, seed % 2 == 0), Config::default());
+        for step in 0..20_000 {
+            if let Some(frame) = scanner.poll(Instant::from_ticks(step * 700)) {
+                assert!(
+                    frame
+                        .samples
+                        .iter()
+                        .all(|s| (s.orientation.norm() - 1.0).abs() < 1e-5)
+                );
+            }
+        }
+    }
+}
