@@ -286,3 +286,6 @@ fn lateness(gap: Duration) -> Option<Duration> {
     gap.checked_sub(timing::PERIOD)
         .filter(|late| *late > timing::LATE)
 }
+
+#[cfg(test)]
+mod tests;
