@@ -1,16 +1,70 @@
-//! The virtual gripper: Robotiq registers behind Modbus RTU (hardware.md §1, §2, §5).
+//! The virtual gripper: Robotiq registers behind Modbus (hardware.md §1, §2, §5).
+//!
+//! One value stands for the gripper; clones share it. As a [`Device`] it speaks Modbus RTU on a serial
+//! line; [`tcp`] gives the same gripper a Modbus TCP face. Registers are refreshed at 200 Hz: what is
+//! written counts from the next refresh on, and what is read is as old as the last.
 
-use std::sync::{Arc, Mutex};
+mod axis;
+mod server;
+pub mod tcp;
+mod three_finger;
+mod two_finger;
 
-use crate::{Device, Instant};
+use std::sync::{Arc, Mutex, MutexGuard};
+
+use crate::clock::lock;
+use crate::{Device, Duration, Instant};
+use server::{Model, Server};
+
+/// Period at which the gripper refreshes its registers.
+pub const REFRESH: Duration = Duration::from_millis(5);
+
+/// Which gripper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Family {
+    /// 3-Finger Adaptive Gripper: 8 registers each way, 4 axes.
+    #[default]
+    ThreeFinger,
+    /// 2F-85: 3 registers each way, 1 axis.
+    TwoFinger85,
+    /// 2F-140.
+    TwoFinger140,
+    /// Hand-E.
+    HandE,
+}
+
+impl Family {
+    /// What a one-axis model is like; `None` for the 3-Finger. Speeds from the manuals' stroke and
+    /// closing speed (20 to 150 mm/s over 85 mm, 30 to 250 over 140, 20 to 150 over 50).
+    fn traits(self) -> Option<two_finger::Traits> {
+        let counts =
+            |slow: f32, fast: f32, stroke: f32| (slow / stroke * 255.0, fast / stroke * 255.0);
+        let (speed, ard_opens) = match self {
+            Self::ThreeFinger => return None,
+            Self::TwoFinger85 => (counts(20.0, 150.0, 85.0), true),
+            Self::TwoFinger140 => (counts(30.0, 250.0, 140.0), true),
+            Self::HandE => (counts(20.0, 150.0, 50.0), true),
+        };
+        Some(two_finger::Traits { speed, ard_opens })
+    }
+}
 
 /// How the virtual gripper is built.
 #[derive(Debug, Clone)]
 pub struct Config {
-    /// Modbus unit (slave id).
+    /// Modbus unit (slave id) on the serial line.
     pub unit: u8,
     /// UART rate, in baud.
     pub baud: u32,
+    /// Which gripper.
+    pub family: Family,
+    /// Silence that ends a frame; the reply begins right after it.
+    pub frame_gap: Duration,
+    /// A request whose first byte comes sooner than this after that of the last one served gets no
+    /// answer.
+    pub request_spacing: Duration,
+    /// True positions at power-on: fingers A, B, C, scissor, in counts.
+    pub start: [f32; 4],
 }
 
 impl Default for Config {
@@ -18,14 +72,37 @@ impl Default for Config {
         Self {
             unit: 9,
             baud: 115_200,
+            family: Family::ThreeFinger,
+            frame_gap: Duration::from_micros(1_750),
+            request_spacing: REFRESH,
+            start: [7.0, 6.0, 6.0, 137.0],
         }
     }
 }
 
-/// The gripper as a serial device. Clones share one gripper: keep one to look at its true state.
+impl Config {
+    /// The default one of another family.
+    #[must_use]
+    pub fn of(family: Family) -> Self {
+        let start = match family {
+            Family::ThreeFinger => Self::default().start,
+            _ => [13.0, 0.0, 0.0, 0.0],
+        };
+        Self {
+            family,
+            start,
+            ..Self::default()
+        }
+    }
+}
+
+/// The gripper. Clones share one: keep one to look at its true state and to put faults on it.
+///
+/// A one-axis gripper's axis is number 0; the other three read 0. Positions are those of the last
+/// refresh.
 #[derive(Clone)]
 pub struct VirtualGripper {
-    state: Arc<Mutex<Config>>,
+    server: Arc<Mutex<Server>>,
 }
 
 impl VirtualGripper {
@@ -33,32 +110,129 @@ impl VirtualGripper {
     #[must_use]
     pub fn new(config: Config) -> Self {
         Self {
-            state: Arc::new(Mutex::new(config)),
+            server: Arc::new(Mutex::new(Server::new(config))),
         }
+    }
+
+    fn server(&self) -> MutexGuard<'_, Server> {
+        lock(&self.server)
+    }
+
+    fn axes<T: Default + Copy>(&self, value: impl Fn(&axis::Axis) -> T) -> [T; 4] {
+        match &self.server().model {
+            Model::Three(three) => core::array::from_fn(|i| value(&three.axes[i])),
+            Model::Two(two) => [value(&two.axis), T::default(), T::default(), T::default()],
+        }
+    }
+
+    fn with_axis(&self, index: usize, act: impl FnOnce(&mut axis::Axis)) {
+        match &mut self.server().model {
+            Model::Three(three) => three.axes.get_mut(index).map(act),
+            Model::Two(two) => (index == 0).then(|| act(&mut two.axis)),
+        };
+    }
+
+    /// Lets the gripper move on to `now` without a request.
+    pub fn run_until(&self, now: Instant) {
+        self.server().run_until(now);
     }
 
     /// True positions of fingers A, B, C and the scissor, in counts with their fraction.
     #[must_use]
     pub fn positions(&self) -> [f32; 4] {
-        [0.0; 4]
+        self.axes(|a| a.position)
     }
 
-    /// How often any axis has started to move.
+    /// How often an axis has started to move, all axes together.
     #[must_use]
     pub fn motions(&self) -> u64 {
-        0
+        self.axes(|a| a.motions).iter().sum()
+    }
+
+    /// Whether any axis moves.
+    #[must_use]
+    pub fn is_moving(&self) -> bool {
+        self.axes(axis::Axis::is_moving).contains(&true)
+    }
+
+    /// The command block as last written.
+    #[must_use]
+    pub fn command_block(&self) -> [u8; 16] {
+        self.server().command
+    }
+
+    /// The status block as a read would give it now.
+    #[must_use]
+    pub fn status_block(&self) -> [u8; 16] {
+        self.server().status()
+    }
+
+    /// How often the command block was written, by any function.
+    #[must_use]
+    pub fn writes(&self) -> u64 {
+        self.server().writes
+    }
+
+    /// Requests answered, and frames that got silence although they were for this unit or broken.
+    #[must_use]
+    pub fn requests(&self) -> (u64, u64) {
+        let server = self.server();
+        (server.requests, server.refused)
+    }
+
+    /// Puts an axis somewhere by hand.
+    pub fn set_position(&self, index: usize, counts: f32) {
+        self.with_axis(index, |a| a.position = counts);
+    }
+
+    /// Puts an object where axis `index` meets it when it closes, or takes it away.
+    pub fn set_object(&self, index: usize, at: Option<f32>) {
+        self.with_axis(index, |a| a.object = at);
+    }
+
+    /// Puts an object where axis `index` meets it when it opens, or takes it away.
+    pub fn set_inner_object(&self, index: usize, at: Option<f32>) {
+        self.with_axis(index, |a| a.inner_object = at);
+    }
+
+    /// Shows fault `code` (0 to F) from the next refresh on; a major one stops everything until rACT
+    /// falls, the others stay until `None`.
+    pub fn set_fault(&self, code: Option<u8>) {
+        let code = code.map(|c| c & 0x0F);
+        match &mut self.server().model {
+            Model::Three(three) => three.injected = code,
+            Model::Two(two) => two.injected = code,
+        }
+    }
+
+    /// Swallows the answers to the next `count` requests (they are carried out); `u32::MAX` for ever.
+    pub fn mute(&self, count: u32) {
+        self.server().mute = count;
+    }
+
+    /// Sends every answer this much later.
+    pub fn set_reply_delay(&self, delay: Duration) {
+        self.server().reply_delay = delay;
     }
 }
 
 impl Device for VirtualGripper {
-    fn receive(&mut self, _bytes: &[u8], _now: Instant) {}
-    fn transmit(&mut self, _now: Instant, _out: &mut [u8]) -> usize {
-        0
+    fn receive(&mut self, bytes: &[u8], now: Instant) {
+        let mut server = self.server();
+        for byte in bytes {
+            server.receive(*byte, now);
+        }
     }
+
+    fn transmit(&mut self, now: Instant, out: &mut [u8]) -> usize {
+        self.server().transmit(now, out)
+    }
+
     fn next_due(&self) -> Option<Instant> {
-        None
+        self.server().next_due()
     }
+
     fn baud(&self) -> u32 {
-        crate::clock::lock(&self.state).baud
+        self.server().config.baud
     }
 }
