@@ -1,15 +1,53 @@
-//! Grippers as split-phase state machines.
+//! Grippers as split-phase state machines behind the [`Gripper`] trait.
+//!
+//! One [`Driver`] serves both families; [`ThreeFinger`] and [`TwoFinger`] name the two. What it
+//! promises:
+//!
+//! - **Connecting only reads.** Nothing is written before a motion is set or a task asked for, and
+//!   rACT is never cleared but by [`Driver::reset`] or by an activation that needs it.
+//! - **Activation only when told.** A gripper that is not ready is read, never written to. After a
+//!   request went unanswered the next one reads: a gripper that lost its power meanwhile would take
+//!   the rACT in a motion for an activation, and move.
+//! - A motion goes out as one FC23 that writes the command block and reads the status block, at
+//!   most every 5 ms, and never when its stamp is older than 100 ms.
+//! - rMOD keeps what the gripper reports; rATR is not cleared under a release.
+//! - The echoed position must be one that was sent or was there before; anything else counts only
+//!   when said twice.
+//! - No reply is believed that could be the late one to an earlier request: requests change their
+//!   look (number of registers, function code) while one is owed.
 
-use crate::{Gripper, Instant, Motion, Status, link};
+mod cycle;
+mod echo;
+mod family;
+mod task;
+
+pub use family::{Control, Family, ThreeFingerFamily, TwoFingerFamily};
+pub use task::{Failure, Outcome, Task};
+
+use crate::registers::{three_finger::Mode, two_finger};
+use crate::{Duration, Gripper, Instant, Motion, Status, link, timing};
+use cycle::Doing;
+use echo::EchoWatch;
 use embedded_io::{Read, ReadReady, Write};
+use family::Snapshot;
+use task::Running;
 
-/// What a driver needs to know.
+/// What a driver needs to know about its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
     /// The gripper's Modbus address; Robotiq's default is 9.
     pub unit: u8,
     /// The line's speed, baud; the deadlines are computed from it. Robotiq's default is 115200.
     pub baud: u32,
+    /// From the end of a request to the start of its reply, at most ([`timing::RESPONSE`]; on a PC
+    /// with other work [`timing::RESPONSE_PC`]).
+    pub response: Duration,
+    /// Silence between frames; `None` for the standard's ([`timing::silence`]).
+    pub silence: Option<Duration>,
+    /// Least time from one request to the next, not below [`timing::CYCLE`].
+    pub cycle: Duration,
+    /// Whether a set reserved bit makes a status invalid. On, unless a gripper's firmware sets one.
+    pub check_reserved: bool,
 }
 
 impl Default for Config {
@@ -17,6 +55,32 @@ impl Default for Config {
         Self {
             unit: 9,
             baud: 115_200,
+            response: timing::RESPONSE,
+            silence: None,
+            cycle: timing::CYCLE,
+            check_reserved: true,
+        }
+    }
+}
+
+impl Config {
+    /// The default with a PC's allowance for late replies.
+    #[must_use]
+    pub fn for_pc() -> Self {
+        Self {
+            response: timing::RESPONSE_PC,
+            ..Self::default()
+        }
+    }
+
+    fn link(&self, longest_reply: usize) -> link::Config {
+        let silence = self.silence.unwrap_or(timing::silence(self.baud));
+        link::Config {
+            unit: self.unit,
+            baud: self.baud,
+            response: self.response,
+            silence,
+            longest_reply,
         }
     }
 }
@@ -25,49 +89,227 @@ impl Default for Config {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Error {
-    /// Not written yet.
-    Unfinished,
+    /// The line failed, or what it carried was not believed.
+    Link(link::Error),
+    /// The line is fine; the gripper did not do what it was asked to.
+    Task {
+        /// What was asked.
+        task: Task,
+        /// Why it did not happen.
+        why: Failure,
+    },
 }
 
-/// The 3-Finger Adaptive Gripper.
-pub struct ThreeFinger<S> {
-    serial: S,
+impl core::fmt::Display for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Self::Link(error) => write!(f, "{error}"),
+            Self::Task { task, why } => write!(f, "{task} failed: {why}"),
+        }
+    }
+}
+
+impl core::error::Error for Error {}
+
+impl From<link::Error> for Error {
+    fn from(error: link::Error) -> Self {
+        Self::Link(error)
+    }
+}
+
+/// The 3-Finger Adaptive Gripper: finger A, B, C, scissor.
+pub type ThreeFinger<S> = Driver<S, ThreeFingerFamily, 4>;
+
+/// The 2F-85, 2F-140 and Hand-E: one axis.
+pub type TwoFinger<S> = Driver<S, TwoFingerFamily, 1>;
+
+/// A gripper of family `F` with `X` axes behind the port `S`.
+#[derive(Debug)]
+pub struct Driver<S, F, const X: usize> {
+    link: link::Link<S>,
+    config: Config,
+    family: F,
+    motion: Option<(Motion<X>, Instant)>,
+    snapshot: Option<Snapshot<X>>,
+    echo: EchoWatch<X>,
+    doing: Option<Doing<X>>,
+    /// The newest motion that left.
+    sent: Option<Motion<X>>,
+    /// Nothing is written before a read has been answered.
+    verify: bool,
+    /// Requests in a row without an answer.
+    misses: u32,
+    next_start: Instant,
+    running: Option<Running>,
+    outcome: Option<(Task, Outcome)>,
 }
 
 impl<S: Read + ReadReady + Write> ThreeFinger<S> {
-    /// A driver for the gripper behind `serial`. Sends nothing yet.
+    /// A driver for the 3-Finger gripper behind `serial`, with [`Control::INDIVIDUAL`]. Sends
+    /// nothing yet.
     pub fn new(serial: S, config: Config) -> Self {
-        let _ = config;
-        Self { serial }
+        Self::with_family(serial, config, ThreeFingerFamily::default())
+    }
+
+    /// Which axes follow their own positions from the next motion on.
+    pub fn set_control(&mut self, control: Control) {
+        self.family.control = control;
+    }
+
+    /// Asks for another grasping mode: **the fingers move**. The gripper must be ready. Motions
+    /// with the scissor on its own take its place over from the mode again.
+    pub fn set_mode(&mut self, mode: Mode) {
+        self.begin_task(Task::Mode(mode));
+    }
+
+    /// The grasping mode the gripper last reported.
+    pub fn mode(&self) -> Option<Mode> {
+        self.snapshot.map(|snapshot| snapshot.mode)
+    }
+}
+
+impl<S: Read + ReadReady + Write> TwoFinger<S> {
+    /// A driver for the 2F-85, 2F-140 or Hand-E behind `serial`. Sends nothing yet.
+    pub fn new(serial: S, model: two_finger::Model, config: Config) -> Self {
+        Self::with_family(
+            serial,
+            config,
+            TwoFingerFamily {
+                model,
+                direction: two_finger::Release::Opening,
+            },
+        )
+    }
+
+    /// Which gripper it is.
+    pub fn model(&self) -> two_finger::Model {
+        self.family.model
+    }
+
+    /// Asks for an automatic release in the given direction: **the fingers move**.
+    pub fn release_towards(&mut self, direction: two_finger::Release) {
+        self.family.direction = direction;
+        self.begin_task(Task::Release);
+    }
+}
+
+impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> {
+    fn with_family(serial: S, config: Config, family: F) -> Self {
+        let longest_reply = 5 + 2 * usize::from(F::REGISTERS);
+        Self {
+            link: link::Link::new(serial, config.link(longest_reply)),
+            config,
+            family,
+            motion: None,
+            snapshot: None,
+            echo: EchoWatch::default(),
+            doing: None,
+            sent: None,
+            verify: true,
+            misses: 0,
+            next_start: Instant::from_ticks(0),
+            running: None,
+            outcome: None,
+        }
     }
 
     /// The port.
     pub fn serial_mut(&mut self) -> &mut S {
-        &mut self.serial
+        self.link.serial_mut()
     }
 
     /// Gives the port back.
-    pub fn release(self) -> S {
-        self.serial
+    pub fn into_serial(self) -> S {
+        self.link.release()
+    }
+
+    /// The line: its trace, its counters, its settings.
+    pub fn link(&self) -> &link::Link<S> {
+        &self.link
+    }
+
+    /// The newest status, if there is one.
+    pub fn status(&self) -> Option<Status<X>> {
+        self.snapshot.map(|snapshot| snapshot.status)
+    }
+
+    /// The newest status block as it came, for a person who wants bytes. Bytes past a family's
+    /// block are 0.
+    pub fn raw_status(&self) -> Option<[u8; 16]> {
+        self.snapshot.map(|snapshot| snapshot.raw)
+    }
+
+    /// Whether the gripper repeats the newest motion sent and follows it. Until then its contacts
+    /// speak of an earlier one.
+    pub fn accepted(&self) -> bool {
+        match (self.sent, self.snapshot) {
+            (Some(motion), Some(snapshot)) => {
+                snapshot.status.going_to && self.family.repeats(&motion, &snapshot.echo)
+            }
+            _ => false,
+        }
+    }
+
+    /// Clears rACT: **the gripper lets go**, forgets its faults and needs an activation after it.
+    pub fn reset(&mut self) {
+        self.begin_task(Task::Reset);
+    }
+
+    /// Asks for an automatic release: **all axes open slowly** (a 2-Finger one goes in the
+    /// direction last set, opening at first). It ends in fault 0F and needs an activation after it.
+    pub fn automatic_release(&mut self) {
+        self.begin_task(Task::Release);
+    }
+
+    /// The task under way.
+    pub fn task(&self) -> Option<Task> {
+        self.running.map(|running| running.task)
+    }
+
+    /// How the last finished task ended.
+    pub fn outcome(&self) -> Option<(Task, Outcome)> {
+        self.outcome
     }
 }
 
-impl<S: Read + ReadReady + Write> Gripper<4> for ThreeFinger<S> {
+impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Gripper<X> for Driver<S, F, X> {
     type Error = Error;
 
-    fn poll(&mut self, _now: Instant) -> Option<Result<Status<4>, Error>> {
+    fn poll(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
+        if let Some(result) = self.hear(now) {
+            return Some(result);
+        }
+        if let Some(error) = self.overdue(now) {
+            return Some(Err(error));
+        }
+        if self.doing.is_none() && now >= self.next_start && self.link.is_free(now) {
+            return self.begin(now).err().map(Err);
+        }
         None
     }
 
-    fn set_motion(&mut self, _motion: Option<Motion<4>>, _stamp: Instant) {}
+    fn set_motion(&mut self, motion: Option<Motion<X>>, stamp: Instant) {
+        self.motion = motion.map(|motion| (motion, stamp));
+    }
 
-    fn activate(&mut self) {}
+    fn activate(&mut self) {
+        self.begin_task(Task::Activate);
+    }
 
     fn next_due(&self) -> Instant {
-        Instant::from_ticks(u64::MAX / 4)
+        let line = self.link.next_due();
+        let cycle = if self.doing.is_some() {
+            line
+        } else {
+            line.max(self.next_start)
+        };
+        match self.running.and_then(|running| running.deadline) {
+            Some(deadline) => cycle.min(deadline),
+            None => cycle,
+        }
     }
 
     fn counters(&self) -> link::Counters {
-        link::Counters::default()
+        self.link.counters()
     }
 }

@@ -1,24 +1,514 @@
-//! The master's side of one Modbus RTU line.
+//! The master's side of one Modbus RTU line: a transaction at a time, and no wrong byte believed.
+//!
+//! Follows "MODBUS over Serial Line" 1.02, with stricter rules where the standard leaves a master
+//! to guess:
+//!
+//! - A reply ends by the length its request implies, never by silence: pauses inside it are fine.
+//! - The CRC is judged first, over that length; then address, function, byte count, reserved bits
+//!   and the echo of a write. Five bytes are an exception only if their own CRC fits.
+//! - After any failure the line is drained: nothing is sent before the reply that failed can no
+//!   longer start, and before a silence counted from the last poll that saw bytes.
+//! - A request that went unanswered leaves a [`Debt`]: no request whose reply could be mistaken for
+//!   the late one is sent for [`timing::MEMORY`].
+//! - An RS-485 adapter that echoes is recognised by a read, whose request can never be its reply.
+//!   Writes, whose reply may look like their request, wait for that knowledge.
+//!
+//! The link reads no clock and never blocks: it reads only what `read_ready` announces and expects
+//! the port to take a request (at most 64 bytes) into its queue.
 
-/// What happened on the line since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Counters {
-    /// Requests sent.
-    pub requests: u32,
-    /// Replies that passed every check.
-    pub replies: u32,
-    /// Replies whose CRC was wrong.
-    pub crc: u32,
-    /// Late replies to earlier requests, recognised and thrown away.
-    pub stale: u32,
-    /// Replies with a right CRC that do not answer the request.
-    pub shape: u32,
-    /// Requests without an answer in time.
-    pub timeouts: u32,
-    /// Exceptions: the device said no.
-    pub exceptions: u32,
-    /// Bytes that belong to no reply.
-    pub noise: u32,
-    /// Failures of the port itself.
-    pub port: u32,
+mod judge;
+mod owed;
+mod port;
+mod trace;
+
+pub use owed::Debt;
+pub use trace::{Counters, Entry, Event, TRACE_BYTES, TRACE_LEN, Trace};
+
+use crate::rtu::{self, Request, Response};
+use crate::{Duration, Instant, timing};
+use embedded_io::{ErrorKind, Read, ReadReady, Write};
+use judge::{Pending, Verdict};
+use owed::{Owed, Signature};
+
+/// Longest request the link sends, bytes.
+pub const MAX_REQUEST: usize = 64;
+/// Longest reply the link takes, bytes.
+pub const MAX_REPLY: usize = 64;
+/// Bytes read in one poll at most: a port that never runs dry must not hold the loop.
+const POLL_BYTES: usize = 512;
+
+/// What a link needs to know about its line.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Config {
+    /// The slave's address.
+    pub unit: u8,
+    /// Speed, baud.
+    pub baud: u32,
+    /// From the end of a request to the start of its reply, at most.
+    pub response: Duration,
+    /// Silence between frames.
+    pub silence: Duration,
+    /// Longest reply any request of the user has, bytes: the quarantine after a timeout.
+    pub longest_reply: usize,
+}
+
+impl Config {
+    /// The usual times for a line of `baud` (see [`timing`]).
+    #[must_use]
+    pub const fn new(unit: u8, baud: u32) -> Self {
+        let (response, silence) = (timing::RESPONSE, timing::silence(baud));
+        Self {
+            unit,
+            baud,
+            response,
+            silence,
+            longest_reply: 21,
+        }
+    }
+}
+
+/// The check a valid reply failed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Field {
+    /// Another slave's address.
+    Unit,
+    /// Another function code.
+    Function,
+    /// Another byte count.
+    ByteCount,
+    /// A bit that is always 0 is set.
+    Reserved,
+    /// A write's address, quantity or value is not what was sent; or the gripper repeats a position
+    /// nobody asked for.
+    Echo,
+}
+
+/// What failed at the port itself.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum PortFault {
+    /// Reading.
+    Read(ErrorKind),
+    /// Writing.
+    Write(ErrorKind),
+    /// The other side is gone: a read or a write of no bytes.
+    Closed,
+}
+
+/// Why a transaction has no answer.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Error {
+    /// As many bytes as the reply has, with a wrong CRC.
+    Crc,
+    /// The late reply to an earlier request.
+    Stale,
+    /// A whole frame with a right CRC that does not answer the request.
+    Shape(Field),
+    /// No whole reply in time.
+    Timeout {
+        /// Bytes that did arrive.
+        received: usize,
+    },
+    /// The device understood and said no.
+    Exception(rtu::Exception),
+    /// The line does not fall silent: so many bytes that belong to nothing.
+    Noise(u32),
+    /// The port failed.
+    Port(PortFault),
+}
+
+impl core::fmt::Display for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match *self {
+            Self::Crc => write!(
+                f,
+                "the reply's CRC is wrong: check cable, ground and termination"
+            ),
+            Self::Stale => write!(
+                f,
+                "the late reply to an earlier request came: the line is slower than configured"
+            ),
+            Self::Shape(field) => {
+                let what = match field {
+                    Field::Unit => {
+                        "it comes from another slave: two masters, or another unit number"
+                    }
+                    Field::Function => "another function code",
+                    Field::ByteCount => "another byte count",
+                    Field::Reserved => "a reserved bit is set",
+                    Field::Echo => "it repeats something that was not sent",
+                };
+                write!(f, "a valid frame does not answer the request: {what}")
+            }
+            Self::Timeout { received: 0 } => {
+                write!(
+                    f,
+                    "no answer: check power, cable, baud rate and unit number"
+                )
+            }
+            Self::Timeout { received } => {
+                write!(
+                    f,
+                    "no whole answer, {received} bytes came: check baud rate and cable"
+                )
+            }
+            Self::Exception(code) => {
+                write!(
+                    f,
+                    "the device refuses with exception {:02X}, {}",
+                    code.0,
+                    code.meaning()
+                )
+            }
+            Self::Noise(n) => {
+                write!(
+                    f,
+                    "the line does not fall silent, {n} bytes nobody asked for: check baud rate and wiring"
+                )
+            }
+            Self::Port(fault) => write!(
+                f,
+                "the serial port failed ({fault:?}): unplugged? reopen it"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for Error {}
+
+/// Why a request was not sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Refused {
+    /// A transaction, a drain or a silence is under way; ask again at [`Link::next_due`].
+    Busy,
+    /// A late reply could be taken for the answer: send one of another look, or wait.
+    Owed,
+    /// A write, while it is not known whether the adapter echoes: read once first.
+    EchoUnknown,
+    /// The request or its reply is longer than the link's buffers, or cannot be put into bytes.
+    Length,
+    /// The port failed.
+    Port(PortFault),
+}
+
+/// Whether the adapter sends back what it is given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Echo {
+    /// No read has been answered yet.
+    Unknown,
+    /// It does not.
+    Off,
+    /// It does: every reply comes after a copy of its request.
+    On,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum State {
+    /// Nothing may be sent before `free_at`; then the line is ours.
+    Idle { free_at: Instant },
+    /// A request is out. `first_due`: something must have come; `last_due`: everything.
+    Waiting {
+        pending: Pending,
+        first_due: Instant,
+        last_due: Instant,
+    },
+    /// The port failed, or was just opened: it is left alone until `until`, then drained.
+    Resting { until: Instant },
+    /// Bytes are thrown away until `until` and a silence after `heard`.
+    Draining {
+        until: Instant,
+        heard: Instant,
+        babble_at: Instant,
+        thrown: u32,
+    },
+}
+
+/// A master on one line, over the port `S`.
+#[derive(Debug)]
+pub struct Link<S> {
+    serial: S,
+    config: Config,
+    state: State,
+    echo: Echo,
+    /// The echo of the request under way has been taken off.
+    stripped: bool,
+    received: [u8; MAX_REQUEST + MAX_REPLY],
+    length: usize,
+    request: [u8; MAX_REQUEST],
+    owed: Owed,
+    counters: Counters,
+    trace: Trace,
+}
+
+impl<S: Read + ReadReady + Write> Link<S> {
+    /// A link over `serial`. Sends nothing; what lies unread in the port is drained first.
+    pub fn new(serial: S, config: Config) -> Self {
+        Self {
+            serial,
+            config,
+            state: State::Resting {
+                until: Instant::from_ticks(0),
+            },
+            echo: Echo::Unknown,
+            stripped: false,
+            received: [0; MAX_REQUEST + MAX_REPLY],
+            length: 0,
+            request: [0; MAX_REQUEST],
+            owed: Owed::default(),
+            counters: Counters::default(),
+            trace: Trace::default(),
+        }
+    }
+
+    /// The port.
+    pub fn serial_mut(&mut self) -> &mut S {
+        &mut self.serial
+    }
+
+    /// Gives the port back.
+    pub fn release(self) -> S {
+        self.serial
+    }
+
+    /// The line's settings.
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// What happened since the start.
+    pub fn counters(&self) -> Counters {
+        self.counters
+    }
+
+    /// What happened last.
+    pub fn trace(&self) -> &Trace {
+        &self.trace
+    }
+
+    /// Whether the adapter echoes, as far as known.
+    pub fn echo(&self) -> Echo {
+        self.echo
+    }
+
+    /// Whether a late reply could be taken for the answer to `request`.
+    pub fn debt(&mut self, request: &Request<'_>, now: Instant) -> Debt {
+        self.owed.expire(now);
+        self.owed.debt(Signature::of(self.config.unit, request))
+    }
+
+    /// When the first debt ends, if there is one.
+    pub fn debt_ends(&self) -> Option<Instant> {
+        self.owed.earliest()
+    }
+
+    /// Whether a request can be sent at `now` as far as the line goes.
+    pub fn is_free(&self, now: Instant) -> bool {
+        matches!(self.state, State::Idle { free_at } if now >= free_at)
+    }
+
+    /// When [`Self::poll`] or [`Self::start`] has something to do next without a byte arriving.
+    pub fn next_due(&self) -> Instant {
+        match self.state {
+            State::Idle { free_at } => free_at,
+            State::Resting { until } => until,
+            State::Waiting {
+                first_due,
+                last_due,
+                ..
+            } => {
+                if self.length == 0 {
+                    first_due
+                } else {
+                    last_due
+                }
+            }
+            State::Draining { until, heard, .. } => {
+                until.max(timing::after(heard, self.config.silence))
+            }
+        }
+    }
+
+    /// Sends `request`, if the line is free. `reserved` marks the bits of the reply's register
+    /// bytes that are always 0 (bytes past its end are not checked).
+    ///
+    /// # Errors
+    /// [`Refused`]; nothing was sent then, unless the port failed half-way.
+    pub fn start(
+        &mut self,
+        request: &Request<'_>,
+        reserved: &'static [u8],
+        now: Instant,
+    ) -> Result<(), Refused> {
+        self.hear_idle(now).map_err(Refused::Port)?;
+        if !self.is_free(now) {
+            return Err(Refused::Busy);
+        }
+        let pending = Pending::new(self.config.unit, request, reserved);
+        if pending.reply.length > MAX_REPLY {
+            return Err(Refused::Length);
+        }
+        if pending.is_write() && self.echo == Echo::Unknown {
+            return Err(Refused::EchoUnknown);
+        }
+        if self.debt(request, now) == Debt::Open {
+            return Err(Refused::Owed);
+        }
+        request
+            .emit(self.config.unit, &mut self.request)
+            .map_err(|_| Refused::Length)?;
+        self.send(pending.request_len, now)?;
+        let first_due = timing::after(
+            now,
+            timing::first_byte(self.config.baud, pending.request_len, self.config.response),
+        );
+        let last_due = timing::after(
+            first_due,
+            timing::last_byte(self.config.baud, pending.reply.length),
+        );
+        (self.length, self.stripped) = (0, false);
+        self.state = State::Waiting {
+            pending,
+            first_due,
+            last_due,
+        };
+        Ok(())
+    }
+
+    /// Takes in what has arrived and returns at once: the answer, the failure, or nothing yet.
+    pub fn poll(&mut self, now: Instant) -> Option<Result<Response<'_>, Error>> {
+        let outcome = match self.state {
+            State::Idle { .. } => self
+                .hear_idle(now)
+                .err()
+                .map(|fault| Err(Error::Port(fault))),
+            State::Resting { until } => {
+                if now >= until {
+                    self.begin_drain(now, timing::after(now, self.quarantine()));
+                }
+                None
+            }
+            State::Waiting {
+                pending,
+                first_due,
+                last_due,
+            } => self.wait(now, pending, first_due, last_due),
+            State::Draining { .. } => self.drain(now).map(Err),
+        };
+        match outcome? {
+            Ok(length) => {
+                let frame = self.received.get(..length).unwrap_or(&[]);
+                // The judge has parsed it already; a failure here cannot happen.
+                Some(
+                    Response::parse(frame)
+                        .map(|(_, response)| response)
+                        .map_err(|_| Error::Crc),
+                )
+            }
+            Err(error) => Some(Err(error)),
+        }
+    }
+
+    /// Rejects the reply just returned by [`Self::poll`]: its meaning is impossible. The line is
+    /// drained as after any other failure.
+    pub fn reject(&mut self, field: Field, request: &Request<'_>, now: Instant) -> Error {
+        self.counters.replies = self.counters.replies.wrapping_sub(1);
+        self.owed.add(Signature::of(self.config.unit, request), now);
+        self.fail(Error::Shape(field), now, now)
+    }
+
+    fn wait(
+        &mut self,
+        now: Instant,
+        pending: Pending,
+        first_due: Instant,
+        last_due: Instant,
+    ) -> Option<Result<usize, Error>> {
+        if let Err(fault) = self.receive() {
+            self.owed.add(pending.reply, now);
+            return Some(Err(Error::Port(self.fail_port(fault, now))));
+        }
+        let error = match self.judge(&pending) {
+            Verdict::Reply => return Some(Ok(self.accept(&pending, now))),
+            Verdict::Wrong(error) => error,
+            Verdict::More
+                if now
+                    >= if self.length == 0 {
+                        first_due
+                    } else {
+                        last_due
+                    } =>
+            {
+                Error::Timeout {
+                    received: self.length,
+                }
+            }
+            Verdict::More => return None,
+        };
+        // An exception is the answer; anything else leaves the true reply outstanding.
+        let rest = match error {
+            Error::Exception(_) => now,
+            Error::Timeout { .. } => timing::after(now, self.quarantine()),
+            _ => first_due,
+        };
+        if !matches!(error, Error::Exception(_)) {
+            self.owed.add(pending.reply, now);
+            self.echo = Echo::Unknown;
+        }
+        Some(Err(self.fail(error, now, rest)))
+    }
+
+    fn accept(&mut self, pending: &Pending, now: Instant) -> usize {
+        let (reply, all) = (pending.reply.length, self.length);
+        self.counters.replies = self.counters.replies.wrapping_add(1);
+        self.owed.settle_all();
+        if !pending.is_write() && self.echo == Echo::Unknown {
+            self.echo = Echo::Off;
+        }
+        let frame = self.received.get(..reply).unwrap_or(&[]);
+        self.trace.note(now, Event::Received, frame);
+        self.state = State::Idle {
+            free_at: timing::after(now, self.config.silence),
+        };
+        if all > reply {
+            self.throw_away(all - reply, now);
+            self.begin_drain(now, now);
+        }
+        reply
+    }
+
+    /// Notes the failure and drains the line, at least until `rest`.
+    fn fail(&mut self, error: Error, now: Instant, rest: Instant) -> Error {
+        self.counters.count(error);
+        let bytes = self.received.get(..self.length).unwrap_or(&[]);
+        self.trace.note(now, Event::Failed(error), bytes);
+        self.begin_drain(now, rest);
+        error
+    }
+
+    /// Notes a failure of the port and leaves it alone for a while.
+    fn fail_port(&mut self, fault: PortFault, now: Instant) -> PortFault {
+        self.fail(Error::Port(fault), now, now);
+        self.state = State::Resting {
+            until: timing::after(now, timing::PORT_REST),
+        };
+        fault
+    }
+
+    fn begin_drain(&mut self, now: Instant, rest: Instant) {
+        self.length = 0;
+        let babble_at = timing::after(now.max(rest), timing::babble(self.config.baud));
+        self.state = State::Draining {
+            until: rest,
+            heard: now,
+            babble_at,
+            thrown: 0,
+        };
+    }
+
+    fn quarantine(&self) -> Duration {
+        timing::quarantine(
+            self.config.baud,
+            self.config.longest_reply,
+            self.config.silence,
+        )
+    }
 }

@@ -1,0 +1,243 @@
+//! One cycle after the other: what goes out next, and what to make of what comes back.
+
+use super::family::{Block, Family, may_move};
+use super::task::Stage;
+use super::{Driver, Error};
+use crate::link::{self, Debt, Field, Refused};
+use crate::registers::{COMMAND, STATUS};
+use crate::rtu::{Registers, Request, Response, function};
+use crate::{Instant, Motion, Status, timing};
+use embedded_io::{Read, ReadReady, Write};
+
+/// The request under way.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Doing<const X: usize> {
+    /// Function code: a read's, or FC23.
+    function: u8,
+    /// Registers read.
+    quantity: u16,
+    /// What FC23 writes.
+    block: Block,
+    /// The motion in it.
+    motion: Option<Motion<X>>,
+}
+
+impl<const X: usize> Doing<X> {
+    fn read((function, quantity): (u8, u16)) -> Self {
+        Self {
+            function,
+            quantity,
+            block: Block::default(),
+            motion: None,
+        }
+    }
+
+    fn request(&self, registers: u16) -> Request<'_> {
+        let (address, quantity) = (STATUS, self.quantity);
+        let values = self
+            .block
+            .get(..2 * usize::from(registers))
+            .and_then(Registers::from_bytes);
+        match (self.function, values) {
+            (function::READ_WRITE, Some(values)) => Request::ReadWrite {
+                read_address: STATUS,
+                read_quantity: quantity,
+                write_address: COMMAND,
+                values,
+            },
+            (function::READ_INPUT, _) => Request::ReadInput { address, quantity },
+            _ => Request::ReadHolding { address, quantity },
+        }
+    }
+}
+
+impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> {
+    /// Takes in what the line brought.
+    pub(super) fn hear(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
+        let mut block = self
+            .snapshot
+            .map_or(Block::default(), |snapshot| snapshot.raw);
+        let answer = match self.link.poll(now)? {
+            Ok(
+                Response::ReadHolding(values)
+                | Response::ReadInput(values)
+                | Response::ReadWrite(values),
+            ) => {
+                // What a shorter read leaves out keeps its last value.
+                block
+                    .iter_mut()
+                    .zip(values.bytes())
+                    .for_each(|(byte, value)| *byte = *value);
+                Ok(())
+            }
+            // The link has checked the function code; nothing else can come.
+            Ok(_) => Err(link::Error::Shape(Field::Function)),
+            Err(error) => Err(error),
+        };
+        let doing = self.doing.take();
+        if let Err(error) = answer {
+            self.note_failure(error);
+            return Some(Err(error.into()));
+        }
+        self.misses = 0;
+        let doing = doing?;
+        if doing.quantity < F::WHOLE {
+            // A sign of life, not a status.
+            return None;
+        }
+        Some(self.understand(&block, &doing, now))
+    }
+
+    fn note_failure(&mut self, error: link::Error) {
+        match error {
+            link::Error::Timeout { .. } => {
+                self.misses = self.misses.saturating_add(1);
+                self.verify = true;
+                if self.misses >= timing::PATIENCE {
+                    let spacing = timing::MEMORY.as_ticks() / F::READS.len().max(1) as u64;
+                    let spacing = crate::Duration::from_ticks(spacing);
+                    self.next_start = timing::after(self.next_start, spacing);
+                }
+            }
+            link::Error::Port(_) | link::Error::Noise(_) => self.verify = true,
+            _ => {}
+        }
+    }
+
+    /// A reply the link let through: reserved bits, echo, meaning; then the task under way.
+    fn understand(
+        &mut self,
+        block: &Block,
+        doing: &Doing<X>,
+        now: Instant,
+    ) -> Result<Status<X>, Error> {
+        let judged = self
+            .family
+            .decode(block, now, self.config.check_reserved)
+            .and_then(|snapshot| {
+                if self.running.is_some() {
+                    // A task writes blocks of its own: any echo may come.
+                    self.echo.forget();
+                }
+                if self.echo.believes(snapshot.echo) {
+                    Ok(snapshot)
+                } else {
+                    Err(Field::Echo)
+                }
+            });
+        let mut snapshot = match judged {
+            Ok(snapshot) => snapshot,
+            Err(field) => {
+                let error = self.link.reject(field, &doing.request(F::REGISTERS), now);
+                return Err(error.into());
+            }
+        };
+        let ours = self.family.is_individual() && self.sent.is_some();
+        if !ours {
+            snapshot.status.echo = self.family.followed(&snapshot);
+        }
+        self.snapshot = Some(snapshot);
+        self.verify = false;
+        self.step_task(&snapshot)?;
+        Ok(snapshot.status)
+    }
+
+    /// Starts the next request, if one may be sent now.
+    pub(super) fn begin(&mut self, now: Instant) -> Result<(), Error> {
+        let wanted = self.wanted(now);
+        let Some(doing) = self.with_fresh_look(wanted, now) else {
+            // Every look is owed; the first debt ends in time.
+            self.next_start = self
+                .link
+                .debt_ends()
+                .unwrap_or(now)
+                .max(timing::after(now, timing::TICK));
+            return Ok(());
+        };
+        let reserved = if self.config.check_reserved {
+            F::RESERVED
+        } else {
+            &[]
+        };
+        match self.link.start(&doing.request(F::REGISTERS), reserved, now) {
+            Ok(()) => {}
+            Err(Refused::Port(fault)) => {
+                self.verify = true;
+                return Err(link::Error::Port(fault).into());
+            }
+            // Bytes nobody asked for came in this moment, or a debt appeared: again at next_due.
+            Err(_) => {
+                self.next_start = timing::after(now, timing::TICK);
+                return Ok(());
+            }
+        }
+        if doing.function == function::READ_WRITE {
+            self.echo.note_sent(self.family.positions(&doing.block));
+        }
+        if doing.motion.is_some() {
+            self.sent = doing.motion;
+        }
+        self.next_start = timing::after(now, self.config.cycle.max(timing::CYCLE));
+        self.doing = Some(doing);
+        Ok(())
+    }
+
+    /// What should go out: a task's write, a motion, or a read.
+    fn wanted(&self, now: Instant) -> Doing<X> {
+        let read = Doing::read((function::READ_HOLDING, F::REGISTERS));
+        let Some(before) = self.snapshot.filter(|_| !self.verify) else {
+            return read;
+        };
+        let write = |block, motion| Doing {
+            function: function::READ_WRITE,
+            quantity: F::REGISTERS,
+            block,
+            motion,
+        };
+        match self.running.map(|running| running.stage) {
+            Some(Stage::Write(action)) => write(self.family.action(action, &before), None),
+            Some(Stage::Look | Stage::Watch) => read,
+            None => match self.motion {
+                Some((motion, stamp))
+                    if may_move(&before) && timing::since(now, stamp) <= timing::STALE_MOTION =>
+                {
+                    write(self.family.motion(&motion, &before), Some(motion))
+                }
+                _ => read,
+            },
+        }
+    }
+
+    /// The wanted request in a look that no late reply can answer; a write that has none becomes a
+    /// read. Where a later answer has settled the debt, the look may be used again as a last resort.
+    fn with_fresh_look(&mut self, wanted: Doing<X>, now: Instant) -> Option<Doing<X>> {
+        let read = |&look: &(u8, u16)| Doing::read(look);
+        if wanted.function == function::READ_WRITE {
+            let looks = F::EXCHANGES
+                .iter()
+                .map(|&quantity| Doing { quantity, ..wanted });
+            if let Some(doing) = self.first_free(looks, now) {
+                return Some(doing);
+            }
+        }
+        self.first_free(F::READS.iter().map(read), now)
+    }
+
+    fn first_free(
+        &mut self,
+        looks: impl Iterator<Item = Doing<X>>,
+        now: Instant,
+    ) -> Option<Doing<X>> {
+        let mut settled = None;
+        for doing in looks {
+            match self.link.debt(&doing.request(F::REGISTERS), now) {
+                Debt::None => return Some(doing),
+                Debt::Settled => {
+                    settled.get_or_insert(doing);
+                }
+                Debt::Open => {}
+            }
+        }
+        settled
+    }
+}

@@ -1,0 +1,83 @@
+//! Whether an echoed position can be true: it was there before, or it was sent.
+
+use heapless::HistoryBuf;
+
+/// Motions remembered: the echo may lag by the cycles that fit into a refresh, or a few lost ones.
+const SENT: usize = 8;
+
+/// What the gripper may echo.
+#[derive(Debug)]
+pub(super) struct EchoWatch<const X: usize> {
+    known: Option<[u8; X]>,
+    sent: HistoryBuf<[u8; X], SENT>,
+    doubted: Option<[u8; X]>,
+}
+
+impl<const X: usize> Default for EchoWatch<X> {
+    fn default() -> Self {
+        Self {
+            known: None,
+            sent: HistoryBuf::new(),
+            doubted: None,
+        }
+    }
+}
+
+impl<const X: usize> EchoWatch<X> {
+    /// These positions are in a command that leaves now.
+    pub(super) fn note_sent(&mut self, position: [u8; X]) {
+        if self.sent.recent() != Some(&position) {
+            self.sent.write(position);
+        }
+    }
+
+    /// Anything may be echoed next: the command block was written otherwise.
+    pub(super) fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Whether to believe `echo`. An unexpected one is doubted once and believed the second time in
+    /// a row: then somebody else, or the gripper itself, did change it.
+    pub(super) fn believes(&mut self, echo: [u8; X]) -> bool {
+        let expected = self.known.is_none_or(|known| {
+            (0..X).all(|axis| {
+                echo[axis] == known[axis] || self.sent.iter().any(|sent| sent[axis] == echo[axis])
+            })
+        });
+        if !expected && self.doubted != Some(echo) {
+            self.doubted = Some(echo);
+            return false;
+        }
+        self.doubted = None;
+        self.known = Some(echo);
+        if self.sent.recent() == Some(&echo) {
+            // It has caught up: what was sent before is out of the question again.
+            self.sent = HistoryBuf::new();
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_what_was_there_or_was_sent_is_believed_at_once() {
+        let mut watch = EchoWatch::default();
+        assert!(watch.believes([10, 20]));
+        assert!(!watch.believes([11, 20]));
+        watch.note_sent([30, 40]);
+        watch.note_sent([31, 41]);
+        assert!(watch.believes([10, 20]) && watch.believes([30, 40]) && watch.believes([31, 41]));
+        assert!(!watch.believes([30, 40]), "it had caught up");
+    }
+
+    #[test]
+    fn a_foreign_echo_is_believed_when_said_twice_in_a_row() {
+        let mut watch = EchoWatch::default();
+        assert!(watch.believes([1]));
+        assert!(!watch.believes([7]) && !watch.believes([9]) && watch.believes([9]));
+        assert!(watch.believes([9]) && !watch.believes([1]));
+    }
+}

@@ -1,0 +1,150 @@
+//! Whether the bytes received are the reply: length, CRC, then what the frame says.
+
+use super::{Echo, Error, Field, Link, Signature};
+use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
+
+/// What the transaction under way expects.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pending {
+    pub(super) request_len: usize,
+    pub(super) reply: Signature,
+    /// Bits of the register bytes that are always 0.
+    reserved: &'static [u8],
+    /// What a write's reply repeats after the function code.
+    echo: Option<[u8; 4]>,
+}
+
+/// What the bytes so far amount to.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Verdict {
+    /// Too few to tell.
+    More,
+    /// The reply.
+    Reply,
+    /// Certainly not the reply.
+    Wrong(Error),
+}
+
+impl Pending {
+    pub(super) fn new(unit: u8, request: &Request<'_>, reserved: &'static [u8]) -> Self {
+        let words = |first: u16, second: u16| {
+            let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
+            Some([a, b, c, d])
+        };
+        let echo = match *request {
+            Request::WriteSingle { address, value } => words(address, value),
+            Request::WriteMultiple { address, values } => words(address, values.quantity()),
+            _ => None,
+        };
+        Self {
+            request_len: request.buffer_len(),
+            reply: Signature::of(unit, request),
+            reserved,
+            echo,
+        }
+    }
+
+    pub(super) fn is_write(&self) -> bool {
+        self.echo.is_some()
+    }
+
+    /// The checks after the CRC, in order: address, function, byte count, reserved bits, echo.
+    fn check(&self, frame: &Frame<'_>) -> Result<(), Field> {
+        let [unit, code, third] = self.reply.head;
+        if frame.unit() != unit {
+            return Err(Field::Unit);
+        }
+        if frame.function() != code {
+            return Err(Field::Function);
+        }
+        let data = frame.pdu().get(1..).unwrap_or(&[]);
+        if let Some(echo) = self.echo {
+            return if data == echo {
+                Ok(())
+            } else {
+                Err(Field::Echo)
+            };
+        }
+        let Some((&count, values)) = data.split_first() else {
+            return Err(Field::ByteCount);
+        };
+        if count != third {
+            return Err(Field::ByteCount);
+        }
+        if values
+            .iter()
+            .zip(self.reserved)
+            .any(|(byte, mask)| byte & mask != 0)
+        {
+            return Err(Field::Reserved);
+        }
+        Ok(())
+    }
+}
+
+impl<S> Link<S> {
+    /// Judges what has been received, after taking an adapter's echo off its front.
+    pub(super) fn judge(&mut self, pending: &Pending) -> Verdict {
+        if self.strip_echo(pending) {
+            return Verdict::More;
+        }
+        let bytes = self.received.get(..self.length).unwrap_or(&[]);
+        if let Some(verdict) = exception(bytes, pending) {
+            return verdict;
+        }
+        let late = self.owed.matching(bytes, Some(pending.reply));
+        let length = late.map_or(pending.reply.length, |owed| owed.length);
+        let Some(frame) = bytes.get(..length) else {
+            return Verdict::More;
+        };
+        match Frame::new_checked(frame) {
+            Err(_) => Verdict::Wrong(Error::Crc),
+            Ok(_) if late.is_some() => Verdict::Wrong(Error::Stale),
+            Ok(frame) => match pending.check(&frame) {
+                Ok(()) => Verdict::Reply,
+                Err(field) => Verdict::Wrong(Error::Shape(field)),
+            },
+        }
+    }
+
+    /// Takes a copy of the request off the front. `true` while the bytes may still become one.
+    ///
+    /// A read's reply differs from its request in the third byte (a byte count, where the request
+    /// has the high byte of the address), so the bytes decide. A write's reply may be its request
+    /// byte for byte (FC06): there only a known echo counts.
+    fn strip_echo(&mut self, pending: &Pending) -> bool {
+        if pending.is_write() && self.echo != Echo::On || self.stripped {
+            return false;
+        }
+        let request = self.request.get(..pending.request_len).unwrap_or(&[]);
+        let bytes = self.received.get(..self.length).unwrap_or(&[]);
+        let common = bytes.len().min(request.len());
+        if bytes.get(..common) != request.get(..common) {
+            return false;
+        }
+        if bytes.len() < request.len() {
+            return true;
+        }
+        self.received.copy_within(request.len()..self.length, 0);
+        self.length -= request.len();
+        self.echo = Echo::On;
+        self.stripped = true;
+        self.length == 0
+    }
+}
+
+/// A refusal in the first five bytes, if its own CRC fits.
+fn exception(bytes: &[u8], pending: &Pending) -> Option<Verdict> {
+    let [unit, code, _] = pending.reply.head;
+    let frame = Frame::new_checked(bytes.get(..EXCEPTION_FRAME)?).ok()?;
+    if frame.function() != code | function::EXCEPTION {
+        return None;
+    }
+    Some(Verdict::Wrong(
+        match rtu::Response::parse_pdu(frame.pdu()) {
+            _ if frame.unit() != unit => Error::Shape(Field::Unit),
+            Ok(rtu::Response::Exception { code, .. }) => Error::Exception(code),
+            _ => Error::Exception(Exception(0)),
+        },
+    ))
+}

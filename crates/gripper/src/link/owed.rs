@@ -1,0 +1,118 @@
+//! Which replies may still turn up late, and how a fresh one is told from them.
+//!
+//! A Modbus RTU reply names only its slave, function and length. So a request that went unanswered
+//! leaves a debt: for [`timing::MEMORY`] no other request is sent whose reply would look the same.
+//! A reply to a later, different request pays all debts as far as order on the line goes (a slave
+//! answers in order): such a debt is [`Debt::Settled`], and still avoided where that costs nothing.
+
+use crate::{Instant, rtu::Request, timing};
+use heapless::Vec;
+
+/// How a reply starts and how long it is: all that tells one from another.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Signature {
+    /// Address, function code, byte count (or the high byte of the address written to).
+    pub(super) head: [u8; 3],
+    /// Whole length, bytes.
+    pub(super) length: usize,
+}
+
+impl Signature {
+    pub(super) fn of(unit: u8, request: &Request<'_>) -> Self {
+        let third = match *request {
+            Request::ReadHolding { quantity: n, .. }
+            | Request::ReadInput { quantity: n, .. }
+            | Request::ReadWrite {
+                read_quantity: n, ..
+            } => (2 * n) as u8,
+            Request::WriteSingle { address, .. } | Request::WriteMultiple { address, .. } => {
+                (address >> 8) as u8
+            }
+        };
+        Self {
+            head: [unit, request.function(), third],
+            length: request.reply_len(),
+        }
+    }
+}
+
+/// Whether a late reply could be taken for the answer to a request.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Debt {
+    /// No late reply of this look is expected.
+    None,
+    /// One was expected, but a later request has been answered since: it will not come from a slave
+    /// that answers in order.
+    Settled,
+    /// One may come: the request is refused.
+    Open,
+}
+
+#[derive(Clone, Copy, Debug)]
+struct Entry {
+    signature: Signature,
+    until: Instant,
+    settled: bool,
+}
+
+/// Most looks of replies that can be owed at once. Drivers use at most 10.
+const ENTRIES: usize = 12;
+
+/// The debts of one line.
+#[derive(Debug, Default)]
+pub(super) struct Owed(Vec<Entry, ENTRIES>);
+
+impl Owed {
+    /// Forgets what has become too old to turn up.
+    pub(super) fn expire(&mut self, now: Instant) {
+        self.0.retain(|entry| entry.until > now);
+    }
+
+    pub(super) fn debt(&self, signature: Signature) -> Debt {
+        match self.0.iter().find(|entry| entry.signature == signature) {
+            Some(entry) if entry.settled => Debt::Settled,
+            Some(_) => Debt::Open,
+            // A full table must not make a debt invisible.
+            None if self.0.is_full() => Debt::Open,
+            None => Debt::None,
+        }
+    }
+
+    /// The request of this look went unanswered at `now`.
+    pub(super) fn add(&mut self, signature: Signature, now: Instant) {
+        let entry = Entry {
+            signature,
+            until: timing::after(now, timing::MEMORY),
+            settled: false,
+        };
+        match self.0.iter_mut().find(|known| known.signature == signature) {
+            Some(known) => *known = entry,
+            // Never full: a request is refused when it would need an entry that is not there.
+            None => drop(self.0.push(entry)),
+        }
+    }
+
+    /// A reply that no debt looks like has come: in order, all of them are paid.
+    pub(super) fn settle_all(&mut self) {
+        self.0.iter_mut().for_each(|entry| entry.settled = true);
+    }
+
+    /// The owed reply that starts like `bytes`, if it cannot be the one looked for.
+    pub(super) fn matching(&self, bytes: &[u8], expected: Option<Signature>) -> Option<Signature> {
+        let head = bytes.first_chunk::<3>()?;
+        let known = self.0.iter().map(|entry| entry.signature);
+        known
+            .into_iter()
+            .find(|owed| owed.head == *head && expected.is_none_or(|fresh| fresh.head != *head))
+    }
+
+    /// The owed reply of this look has come.
+    pub(super) fn pay(&mut self, signature: Signature) {
+        self.0.retain(|entry| entry.signature != signature);
+    }
+
+    /// When the first debt ends.
+    pub(super) fn earliest(&self) -> Option<Instant> {
+        self.0.iter().map(|entry| entry.until).min()
+    }
+}
