@@ -1,0 +1,79 @@
+//! The bridge as a program for a Cortex-M4F: board code, and the loop that is [`bridge::App`].
+//!
+//! UART 0 speaks the host protocol, UART 1 the glove's serial multiplexer, UART 2 the gripper's Modbus RTU. The weights
+//! live in the board's flash. Runs in QEMU (`mps2-an386`); not tried on hardware.
+#![no_std]
+#![no_main]
+
+mod board;
+
+use board::{Board, Port, PsramSlot, SystemTime, Watchdog, wait_for_interrupt};
+use bridge::gripper::driver::ThreeFinger;
+use bridge::protocol::{Outcome, Server};
+use bridge::{App, Config, Instant, Platform, WeightsStore, glove, gripper};
+
+/// Axes of the 3-Finger gripper.
+const AXES: usize = 4;
+
+type Bridge = App<Machine, Port, ThreeFinger<Port>, PsramSlot, AXES>;
+
+/// What the loop needs from the machine.
+struct Machine {
+    time: SystemTime,
+}
+
+impl Platform for Machine {
+    fn now(&mut self) -> Instant {
+        self.time.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        if self.time.now() < due {
+            wait_for_interrupt();
+        }
+    }
+}
+
+#[cortex_m_rt::entry]
+fn main() -> ! {
+    if let Some(board) = Board::take() {
+        run(board);
+    }
+    // Unreachable on a whole machine: the board is taken once. A reset is the only thing left to try.
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+fn run(board: Board) {
+    let Board {
+        time,
+        host,
+        glove,
+        gripper,
+        slots,
+        mut watchdog,
+    } = board;
+    let store = WeightsStore::new(slots, bridge::app::expected(AXES));
+    let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
+    let gripper = ThreeFinger::new(gripper, gripper::driver::Config::default());
+    let mut app: Bridge = App::new(Machine { time }, scanner, gripper, store, Config::default());
+    let mut server = Server::new(host);
+    watchdog.start();
+    while turn(&mut app, &mut server, &mut watchdog) == Outcome::Continue {}
+    cortex_m::peripheral::SCB::sys_reset()
+}
+
+/// One turn of the loop: the bridge, the host, then sleep until something is due.
+fn turn(app: &mut Bridge, server: &mut Server<Port>, watchdog: &mut Watchdog) -> Outcome {
+    let due = app.step();
+    let outcome = server.poll(app.telemetry().now, app);
+    server.tell_bytes_lost(board::bytes_lost());
+    watchdog.feed();
+    app.platform_mut().wait_until(due);
+    outcome
+}
+
+/// Nothing in the loop panics (a check on the linked program shows it); start-up may.
+#[panic_handler]
+fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
+}
