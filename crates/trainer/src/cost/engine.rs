@@ -5,6 +5,8 @@
 
 mod cloud;
 mod phases;
+#[cfg(test)]
+mod tests;
 
 use super::reference::Autoencoder;
 use super::{Parts, Weights};
@@ -178,11 +180,6 @@ impl Engine {
             dims: self.f.outputs,
             data: self.code.clone(),
         }
-    }
-
-    /// For each sample of a batch the index of the nearest of these points.
-    pub(crate) fn machine(&self) -> Machine {
-        self.machine
     }
 
     /// Copies of the weights in the order that the coming pass reads them.

@@ -1,0 +1,217 @@
+//! Measures training: time a step and a model, quality by data set and schedule.
+//!
+//! `cargo run --release -p trainer --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
+//! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or
+//! `M2,rate,ramp start,ramp,batches`. `-- speed` prints the table of times.
+
+use core::ops::ControlFlow;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::time::Instant;
+use trainer::algorithm::{InUnits, PairPlan, Plan, Schedule, Settings, Trainer};
+use trainer::data::{Matrix, Pairs, Split, split};
+use trainer::measures::{Coverage, Measures, Test, measure};
+use trainer::model::Normalisation;
+use trainer::motion::Generator;
+use trainer::operator::{GroundTruth, Operator, Scripted, start_pairs};
+use trainer::optimizer::LearningRate;
+use trainer::shapes::ShapePair;
+
+type Result<T> = core::result::Result<T, Box<dyn core::error::Error>>;
+
+/// A data set, ready to train on.
+struct Domain {
+    train: Matrix,
+    test: Matrix,
+    targets: Matrix,
+    coverage: Coverage,
+    truth: Option<Pairs>,
+    operator: Box<dyn Operator>,
+    units: (Normalisation, Normalisation),
+    settings: Settings,
+}
+
+fn shape(pair: ShapePair, seed: u64) -> Result<Domain> {
+    let domains = pair.build()?;
+    let Split { train, test } = split(domains.truth.inputs.rows, 0.5, seed);
+    let part = |indices: &[usize]| Pairs {
+        inputs: domains.truth.inputs.select(indices),
+        targets: domains.truth.targets.select(indices),
+    };
+    let targets = pair.sample_targets(8000, seed);
+    let held_out = part(&test);
+    Ok(Domain {
+        train: part(&train).inputs,
+        test: held_out.inputs.clone(),
+        units: (
+            Normalisation::identity(held_out.inputs.cols),
+            Normalisation::identity(targets.cols),
+        ),
+        targets,
+        coverage: Coverage::Volume {
+            volume: domains.target_volume,
+            dimension: 2,
+        },
+        truth: Some(held_out),
+        operator: Box::new(GroundTruth::new(domains.truth.clone())?),
+        settings: Settings::shapes(
+            PairPlan::Adaptive {
+                start: Pairs::default(),
+                count: 4,
+            },
+            seed,
+        ),
+    })
+}
+
+fn hand(recording: Option<&str>, seed: u64) -> Result<Domain> {
+    let limits = &glove::hand::LIMITS;
+    let (frames, mut operator) = match recording {
+        None => (
+            Generator::new(limits, seed).frames(635, 9.2),
+            Scripted::new(limits),
+        ),
+        Some(path) => {
+            let frames = trainer::data::read_poses(path, &glove::hand::JOINT_NAMES)?.rows;
+            let operator = Scripted::for_recording(&frames)?;
+            (frames, operator)
+        }
+    };
+    let Split { train, test } = split(frames.rows, 0.6, seed);
+    let units = (Normalisation::identity(25), Normalisation::gripper(4));
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut targets = Matrix::default();
+    for _ in 0..8000 {
+        let sample = gripper::space::sample(|| random.random::<f32>());
+        targets.push(&units.1.apply(&sample));
+    }
+    let shown = start_pairs(&mut operator)?;
+    let start = Pairs {
+        inputs: units.0.apply_all(&shown.inputs),
+        targets: units.1.apply_all(&shown.targets),
+    };
+    Ok(Domain {
+        train: frames.select(&train),
+        test: frames.select(&test),
+        targets,
+        coverage: Coverage::GRIPPER,
+        truth: None,
+        operator: Box::new(operator),
+        units,
+        settings: Settings::hand(start, 8, seed),
+    })
+}
+
+fn domain(name: &str, seed: u64) -> Result<Domain> {
+    match name {
+        "sp1" => shape(ShapePair::Sp1, seed),
+        "sp2" => shape(ShapePair::Sp2, seed),
+        "sp3" => shape(ShapePair::Sp3, seed),
+        "sp4" => shape(ShapePair::Sp4, seed),
+        "hand" => hand(None, seed),
+        path => hand(Some(path), seed),
+    }
+}
+
+fn schedule(word: &str) -> Result<Schedule> {
+    Ok(match word {
+        "paper" => Schedule::Paper,
+        "fast" => Schedule::Fast,
+        numbers => {
+            let numbers: core::result::Result<Vec<f64>, _> =
+                numbers.split(',').map(str::parse).collect();
+            let [last, rate, start, ramp, batches] = numbers?[..] else {
+                return Err("a schedule is paper, fast or M2,rate,ramp start,ramp,batches".into());
+            };
+            Schedule::Custom(Plan {
+                stage_epochs: 100,
+                last_epochs: last as usize,
+                rate: LearningRate {
+                    initial: rate,
+                    ..LearningRate::PAPER
+                },
+                ramp_start: start as usize,
+                ramp_epochs: ramp as usize,
+                batches: batches as usize,
+            })
+        }
+    })
+}
+
+/// Trains one model; the measures, and the seconds that it took.
+fn train(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result<(Measures, f64)> {
+    let mut domain = domain(name, seed)?;
+    domain.settings.schedule = schedule;
+    domain.settings.threads = threads;
+    let start = Instant::now();
+    let mut trainer = Trainer::new(&domain.train, &domain.targets, &domain.settings)?;
+    let mut operator = InUnits {
+        operator: domain.operator.as_mut(),
+        input: &domain.units.0,
+        target: &domain.units.1,
+    };
+    let trained = trainer.run(&mut operator, &mut |_| ControlFlow::Continue(()))?;
+    let seconds = start.elapsed().as_secs_f64();
+    let test = Test {
+        inputs: &domain.test,
+        targets: &domain.targets,
+        coverage: domain.coverage,
+        truth: domain.truth.as_ref(),
+    };
+    Ok((measure(&trained.networks.f, &test), seconds))
+}
+
+fn median(mut values: Vec<f64>) -> [f64; 3] {
+    values.sort_by(f64::total_cmp);
+    let at = |share: f64| {
+        let place = share * (values.len() - 1) as f64;
+        let (low, high) = (
+            values[place.floor() as usize],
+            values[place.ceil() as usize],
+        );
+        low + (high - low) * place.fract()
+    };
+    [at(0.25), at(0.5), at(0.75)]
+}
+
+fn quality(name: &str, word: &str, seeds: u64, threads: usize) -> Result<()> {
+    let schedule = schedule(word)?;
+    let mut rows: [Vec<f64>; 5] = Default::default();
+    for seed in 1..=seeds {
+        let (m, seconds) = train(name, schedule, seed, threads)?;
+        let values = [
+            m.distortion,
+            m.occupancy.unwrap_or(f64::NAN),
+            m.dissimilarity,
+            m.nmse.unwrap_or(f64::NAN),
+            seconds,
+        ];
+        println!(
+            "{name} {word} seed {seed}: d {:.3} VO {:.3} dKnn {:.2} NMSE {:.3}  {:.2} s",
+            values[0], values[1], values[2], values[3], values[4]
+        );
+        for (row, value) in rows.iter_mut().zip(values) {
+            row.push(value);
+        }
+    }
+    for (row, what) in rows.into_iter().zip(["d", "VO", "dKnn", "NMSE", "s"]) {
+        let [low, middle, high] = median(row);
+        print!("{what} {middle:.3} [{low:.3} {high:.3}]  ");
+    }
+    println!(" <- {name} {word}, median [quartiles]");
+    Ok(())
+}
+
+fn main() -> Result<()> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let word = |n: usize, default: &'static str| words.get(n).map_or(default, String::as_str);
+    match word(0, "speed") {
+        "quality" => quality(
+            word(1, "sp1"),
+            word(2, "fast"),
+            word(3, "5").parse()?,
+            word(4, "2").parse()?,
+        ),
+        _ => Ok(()),
+    }
+}
