@@ -132,7 +132,9 @@ impl<const X: usize> Supervisor<X> {
                 return status.echo[axis];
             }
             let here = status.position[axis];
-            held[axis].clamp(here.saturating_sub(lead), here.saturating_add(lead))
+            held[axis]
+                .max(here.saturating_sub(lead))
+                .min(here.saturating_add(lead))
         });
         self.held = Some(held);
         Some(self.command(held))
@@ -159,6 +161,6 @@ fn obeys<const X: usize>(status: &Status<X>) -> bool {
 
 /// 0 to 1 with no jump in speed at either end.
 fn smooth(t: f32) -> f32 {
-    let t = t.clamp(0.0, 1.0);
+    let t = if t < 1.0 { t } else { 1.0 };
     t * t * (3.0 - 2.0 * t)
 }

@@ -20,7 +20,7 @@ pub fn touches(contact: Contact) -> bool {
 /// The nearest allowed position to `target`: within 0 to 255, and for four axes inside the configuration space with
 /// a margin of two counts. `target` must be finite.
 pub fn project<const X: usize>(target: [f32; X]) -> [f32; X] {
-    let boxed = target.map(|x| x.clamp(0.0, 255.0));
+    let boxed = target.map(|x| limit(x, 0.0, 255.0));
     let Some(four) = four(&boxed) else {
         return boxed;
     };
@@ -30,7 +30,7 @@ pub fn project<const X: usize>(target: [f32; X]) -> [f32; X] {
     }
     let near = space::nearest(&shifted);
     from_four(
-        core::array::from_fn(|axis| (near[axis] - MARGIN).clamp(0.0, 255.0)),
+        core::array::from_fn(|axis| limit(near[axis] - MARGIN, 0.0, 255.0)),
         boxed,
     )
 }
@@ -40,10 +40,19 @@ pub fn project<const X: usize>(target: [f32; X]) -> [f32; X] {
 pub fn approach(desired: f32, before: f32, step: f32, measured: u8, lead: u8) -> f32 {
     let measured = f32::from(measured);
     let lead = f32::from(lead);
-    desired
-        .clamp(before - step, before + step)
-        .clamp(measured - lead, measured + lead)
-        .clamp(0.0, 255.0)
+    let rated = limit(desired, before - step, before + step);
+    limit(limit(rated, measured - lead, measured + lead), 0.0, 255.0)
+}
+
+/// `x` between `low` and `high`. Unlike `clamp` it has no way to panic; a NaN stays one.
+fn limit(x: f32, low: f32, high: f32) -> f32 {
+    if x < low {
+        low
+    } else if x > high {
+        high
+    } else {
+        x
+    }
 }
 
 /// Rounds to counts; a NaN, which cannot come here, would become the measured position.
@@ -51,7 +60,8 @@ pub fn round(x: f32, measured: u8) -> u8 {
     if x.is_nan() {
         return measured;
     }
-    libm::roundf(x).clamp(0.0, 255.0) as u8
+    // Saturates.
+    libm::roundf(x) as u8
 }
 
 /// Whether a position is allowed.
