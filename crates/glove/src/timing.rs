@@ -70,6 +70,10 @@ pub const STEP_RETRY: Duration = Duration::from_ticks(20_000);
 /// How often a step is tried, [`STEP_RETRY`] apart, before the bring-up starts over: 50 · 20 ms = 1 s, more than a reset.
 pub const STEP_TRIES: u8 = 50;
 
+/// How often a sensor is looked for, [`STEP_RETRY`] apart, before the first scan begins without it: 40 · 20 ms = 0.8 s, so
+/// that a glove and a bridge that are switched on together find each other.
+pub const FIRST_TRIES: u8 = 40;
+
 /// First pause after a failed bring-up; it doubles up to [`BACKOFF_MAX`].
 pub const BACKOFF_MIN: Duration = Duration::from_ticks(250_000);
 

@@ -11,9 +11,9 @@
 //! these are read and written here; and everything written is read back.
 
 use super::{Config, Error, Mode, register};
+use crate::Duration;
 use crate::bus::{self, MESSAGE_MAX, Transaction};
 use crate::timing;
-use crate::{Duration, Instant};
 use bno055::{BNO055_ID, BNO055OperationMode, BNO055PowerMode, Bno055};
 use embedded_hal::delay::DelayNs;
 use embedded_hal::i2c::{ErrorKind, ErrorType, I2c, Operation};
@@ -25,6 +25,9 @@ const LOG_MAX: usize = 16;
 /// Units: acceleration m/s² (b0), rate °/s (b1), Euler angles ° (b2), temperature °C (b4), orientation convention Windows
 /// (b7). Written because the data sheet contradicts itself on what stands there after a reset.
 const UNITS: u8 = 0x00;
+
+/// The next step may follow at once.
+const NO_PAUSE: Duration = Duration::from_ticks(0);
 
 /// SYS_STATUS: fusion running.
 const FUSION_RUNNING: u8 = 5;
@@ -38,7 +41,7 @@ pub enum Step {
     Reset,
     /// Chip id again, power mode, clock source, units, read back; then the fusion mode.
     Configure,
-    /// Mode read back, fusion running.
+    /// Mode read back, fusion running; whether the register pointer stays.
     Verify,
     /// What a sensor that fell silent is doing: mode read back.
     Recheck,
@@ -51,6 +54,19 @@ pub struct Outcome {
     pub next: Option<Step>,
     /// How long to leave the sensor alone before that.
     pub pause: Duration,
+    /// Whether a plain read repeats from the last register written, as the data sheet has it; `None` where the step
+    /// did not try.
+    pub pointer_stays: Option<bool>,
+}
+
+impl Outcome {
+    fn then(next: Option<Step>, pause: Duration) -> Self {
+        Self {
+            next,
+            pause,
+            pointer_stays: None,
+        }
+    }
 }
 
 /// What a step needs.
@@ -161,12 +177,7 @@ impl From<Unanswered> for Failure {
 fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result<Outcome, Failure> {
     let mut no_delay = NoDelay;
     let mut sensor = driver(&mut *i2c, address);
-    let then = |step, pause| {
-        Ok(Outcome {
-            next: Some(step),
-            pause,
-        })
-    };
+    let then = |step, pause| Ok(Outcome::then(Some(step), pause));
     match step {
         Step::Identify => {
             check_id(sensor.id()?)?;
@@ -203,13 +214,19 @@ fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result
             check(register::OPR_MODE, config.mode.code(), mode)?;
             let mut status = [0; 2];
             i2c.write_read(address, &[register::SYS_STATUS], &mut status)?;
-            match status {
-                [FUSION_RUNNING, _] => Ok(Outcome {
-                    next: None,
-                    pause: Duration::from_ticks(0),
-                }),
-                [status, error] => Err(Failure::Sensor(Error::NotRunning { status, error })),
+            let [code, error] = status;
+            if code != FUSION_RUNNING {
+                return Err(Failure::Sensor(Error::NotRunning {
+                    status: code,
+                    error,
+                }));
             }
+            let mut again = [0; 2];
+            i2c.read(address, &mut again)?;
+            Ok(Outcome {
+                pointer_stays: Some(again == status),
+                ..Outcome::then(None, NO_PAUSE)
+            })
         }
         Step::Recheck => {
             let mode = sensor.get_mode()?;
@@ -221,10 +238,7 @@ fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result
             } else {
                 Some(Step::Identify)
             };
-            Ok(Outcome {
-                next,
-                pause: Duration::from_ticks(0),
-            })
+            Ok(Outcome::then(next, NO_PAUSE))
         }
     }
 }
@@ -316,10 +330,11 @@ impl I2c for Replay<'_> {
     }
 }
 
-/// The crate's operations (a write, or a write and a read) as one transaction; `None` for anything else.
+/// The operations of one call (a write, a read, or both) as one transaction; `None` for anything else.
 fn describe(address: u8, operations: &[Operation<'_>]) -> Option<Transaction> {
     match operations {
         [Operation::Write(bytes)] => Transaction::write(address, bytes).ok(),
+        [Operation::Read(buffer)] => Transaction::read(address, buffer.len()).ok(),
         [Operation::Write(bytes), Operation::Read(buffer)] => {
             Transaction::write_read(address, bytes, buffer.len()).ok()
         }
@@ -332,13 +347,4 @@ struct NoDelay;
 
 impl DelayNs for NoDelay {
     fn delay_ns(&mut self, _: u32) {}
-}
-
-/// When a step may be tried again after it failed for the `tries`-th time (from 1); `None`: start over.
-pub(crate) fn retry_at(step: Step, tries: u8, now: Instant) -> Option<Instant> {
-    let limit = match step {
-        Step::Identify => 1,
-        _ => timing::STEP_TRIES,
-    };
-    (tries < limit).then(|| timing::after(now, timing::STEP_RETRY))
 }

@@ -133,6 +133,7 @@ fn pause(step: Step, micros: u64) -> Outcome {
     Outcome {
         next: Some(step),
         pause: Duration::from_ticks(micros),
+        pointer_stays: None,
     }
 }
 
@@ -152,12 +153,13 @@ fn bring_up_makes_exactly_these_transactions() {
         Expect::write(a, vec![0x3F, 0x20]),
     ];
     script.extend(configure(a));
-    // Verify: mode read back, system status.
+    // Verify: mode read back, system status, and once more without naming the register.
     script.extend([
         page(a),
         read(a, 0x3D, 0x08),
         Expect::write_read(a, vec![0x39], vec![5, 0]),
     ]);
+    script.push(Expect::read(a, vec![5, 0]));
     let mut bus = scripted(&script);
     assert_eq!(
         run(Step::Identify, a, &mut bus),
@@ -174,6 +176,7 @@ fn bring_up_makes_exactly_these_transactions() {
     let up = Outcome {
         next: None,
         pause: Duration::from_ticks(0),
+        pointer_stays: Some(true),
     };
     assert_eq!(run(Step::Verify, a, &mut bus), Ok(up));
     bus.release().done();
@@ -251,6 +254,23 @@ fn what_is_wrong_at_bring_up_is_named() {
             status: 1,
             error: 3
         })
+    );
+    bus.release().done();
+}
+
+#[test]
+fn a_register_pointer_that_runs_on_is_noticed() {
+    let a = 0x29;
+    let script = [
+        page(a),
+        read(a, 0x3D, 0x08),
+        Expect::write_read(a, vec![0x39], vec![5, 0]),
+        Expect::read(a, vec![0, 0]),
+    ];
+    let mut bus = scripted(&script);
+    assert_eq!(
+        run(Step::Verify, a, &mut bus).unwrap().pointer_stays,
+        Some(false)
     );
     bus.release().done();
 }

@@ -16,7 +16,6 @@ pub(super) enum Job {
         sensor: usize,
         stamp: Instant,
         selects: bool,
-        plain: bool,
     },
     /// The selection of the channel of the step's sensor.
     Select { sensor: usize },
@@ -107,9 +106,8 @@ impl<B: Bus> BusScanner<B> {
                 sensor,
                 stamp,
                 selects,
-                plain,
             } => {
-                self.take_sample(sensor, stamp, selects, plain, result, now);
+                self.take_sample(sensor, stamp, selects, result, now);
                 self.finish_scan(now)
             }
             Job::Select { sensor } => {
@@ -128,7 +126,6 @@ impl<B: Bus> BusScanner<B> {
         k: usize,
         stamp: Instant,
         selects: bool,
-        plain: bool,
         result: Result<Reply, Error>,
         now: Instant,
     ) {
@@ -145,7 +142,7 @@ impl<B: Bus> BusScanner<B> {
             return;
         };
         match sample {
-            Ok(raw) => sensor.take(raw, stamp, plain, &mut self.counters),
+            Ok(raw) => sensor.take(raw, stamp, &mut self.counters),
             Err(cause) => sensor.miss(cause, now, &mut self.counters),
         }
     }
@@ -341,7 +338,6 @@ impl<B: Bus> BusScanner<B> {
                     sensor: k,
                     stamp: now,
                     selects,
-                    plain,
                 })
             }
             Err(cause) => self.sensors[k].miss(cause, now, &mut self.counters),

@@ -3,7 +3,7 @@
 use super::{Counters, Health, Sample};
 use crate::bus;
 use crate::hand::Quaternion;
-use crate::imu::bringup::{Outcome, Step, retry_at};
+use crate::imu::bringup::{Outcome, Step};
 use crate::imu::{self, Error, Fault};
 use crate::timing::{self, after, since};
 use crate::{Duration, Instant};
@@ -13,9 +13,6 @@ const BAD_MAX: u8 = 3;
 
 /// Rechecks in a row without a good sample after which it is brought up again.
 const RECHECKS_MAX: u8 = 3;
-
-/// Plain reads in a row that brought nothing good although the pointer was written: then the pointer does not stay.
-const PLAIN_MAX: u8 = 3;
 
 /// One sensor.
 #[derive(Debug, Clone)]
@@ -42,7 +39,7 @@ pub(super) struct Sensor {
     failures: u8,
     bad: u8,
     rechecks: u8,
-    plain_failures: u8,
+    pointer_stays: bool,
 }
 
 impl Sensor {
@@ -62,7 +59,7 @@ impl Sensor {
             failures: 0,
             bad: 0,
             rechecks: 0,
-            plain_failures: 0,
+            pointer_stays: false,
         }
     }
 
@@ -77,7 +74,7 @@ impl Sensor {
 
     /// Whether the next sample may be read without writing the register pointer.
     pub fn reads_plain(&self) -> bool {
-        self.pointer_set && self.plain_failures < PLAIN_MAX
+        self.pointer_set && self.pointer_stays
     }
 
     pub fn sample(&self) -> Sample {
@@ -91,14 +88,8 @@ impl Sensor {
         }
     }
 
-    /// Eight bytes arrived that were asked for at `stamp`, by a plain read or not.
-    pub fn take(
-        &mut self,
-        raw: [u8; imu::SAMPLE_BYTES],
-        stamp: Instant,
-        plain: bool,
-        counters: &mut Counters,
-    ) {
+    /// Eight bytes arrived that were asked for at `stamp`.
+    pub fn take(&mut self, raw: [u8; imu::SAMPLE_BYTES], stamp: Instant, counters: &mut Counters) {
         self.raw = Some(raw);
         self.pointer_set = true;
         match self.judge(&raw, stamp) {
@@ -112,12 +103,9 @@ impl Sensor {
                 self.distrusted = None;
                 self.health = Health::Good;
                 (self.bad, self.rechecks, self.failures, self.tries) = (0, 0, 0, 0);
-                if plain {
-                    self.plain_failures = 0;
-                }
                 counters.good = counters.good.wrapping_add(1);
             }
-            Err(fault) => self.reject(fault, stamp, plain, counters),
+            Err(fault) => self.reject(fault, stamp, counters),
         }
     }
 
@@ -136,7 +124,7 @@ impl Sensor {
         }
     }
 
-    fn reject(&mut self, fault: Fault, now: Instant, plain: bool, counters: &mut Counters) {
+    fn reject(&mut self, fault: Fault, now: Instant, counters: &mut Counters) {
         if fault == Fault::Zero && !self.fresh {
             self.await_first(now);
             return;
@@ -155,9 +143,6 @@ impl Sensor {
             Fault::Zero | Fault::NotUnit | Fault::Restarted => {}
         }
         self.pointer_set = false;
-        if plain {
-            self.plain_failures = self.plain_failures.saturating_add(1);
-        }
         self.bad = self.bad.saturating_add(1);
         if fault == Fault::Restarted || self.bad >= BAD_MAX {
             self.recheck(Error::Rejected(fault), now);
@@ -238,6 +223,7 @@ impl Sensor {
         self.forget();
         self.due = after(now, outcome.pause);
         self.step = outcome.next;
+        self.pointer_stays = outcome.pointer_stays.unwrap_or(self.pointer_stays);
         if step == Step::Recheck && outcome.next.is_some() {
             // Its fusion has started anew, so the next orientation has nothing to do with the last.
             self.fresh = false;
@@ -251,7 +237,6 @@ impl Sensor {
         }
         self.fresh = false;
         self.up_since = now;
-        self.plain_failures = 0;
         self.health = Health::Starting;
         true
     }
@@ -270,17 +255,18 @@ impl Sensor {
             self.health = Health::Missing(error);
         }
         self.tries = self.tries.saturating_add(1);
-        let hopeless = matches!(error, Error::ChipId(_));
-        match retry_at(step, self.tries, now).filter(|_| !hopeless) {
-            Some(due) => {
-                self.due = due;
-                false
-            }
-            None => {
-                self.restart(error, now);
-                true
-            }
+        let limit = match (step, error) {
+            (_, Error::ChipId(_)) => 1,
+            (Step::Identify, _) if self.tried => 1,
+            (Step::Identify, _) => timing::FIRST_TRIES,
+            _ => timing::STEP_TRIES,
+        };
+        if self.tries >= limit {
+            self.restart(error, now);
+            return true;
         }
+        self.due = after(now, timing::STEP_RETRY);
+        false
     }
 }
 

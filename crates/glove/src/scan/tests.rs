@@ -22,6 +22,8 @@ struct Chip {
     instead: Option<([u8; 8], u32)>,
     frozen: Option<[u8; 8]>,
     fusion_from: u64,
+    /// Its register pointer runs on after a read.
+    runs_on: bool,
 }
 
 /// The bus, the multiplexer and 16 chips; a batch takes 1 ms, a read that fails 30 ms, as behind the serial bridge.
@@ -47,6 +49,7 @@ impl Fake {
             instead: None,
             frozen: None,
             fusion_from: 0,
+            runs_on: false,
         };
         Self {
             chips: (0..16).map(chip).collect(),
@@ -117,7 +120,11 @@ impl Chip {
     }
 
     fn read(&mut self, count: usize, q: &Quaternion, now: u64) -> Vec<u8> {
-        match self.pointer {
+        let pointer = self.pointer;
+        if self.runs_on {
+            self.pointer += count as u8;
+        }
+        match pointer {
             0x00 => [0xA0, 0xFB, 0x32, 0x0F, 0x11, 0x03, 0x15, 0x00][..count].to_vec(),
             0x20 if self.mode == 0 || now < self.fusion_from => vec![0; 8],
             0x20 => {
@@ -129,7 +136,7 @@ impl Chip {
                 self.frozen.unwrap_or(bytes).to_vec()
             }
             0x39 => vec![if self.mode == 0 { 0 } else { 5 }, 0],
-            0x3B => vec![self.units],
+            0x3B => vec![self.units; count],
             0x3D => vec![self.mode],
             0x3E => vec![0],
             other => panic!("register {other:#04X} read"),
@@ -561,6 +568,14 @@ fn a_missing_multiplexer_is_told_from_missing_sensors() {
 }
 
 #[test]
+fn a_sensor_whose_register_pointer_runs_on_has_it_written_for_every_read() {
+    let mut run = Run::new(moving);
+    run.chip(6).runs_on = true;
+    let frames = run.until(3_000_000);
+    assert!(frames.len() > 100 && frames.iter().all(|f| f.good() == ALL));
+}
+
+#[test]
 fn a_period_keeps_scans_apart() {
     let mut run = Run::new(moving);
     let config = Config {
@@ -678,10 +693,12 @@ fn bring_up_of_all() -> Vec<Expect> {
         lines
     });
     step(&|a| {
+        let status = Expect::write_read(a, vec![0x39], vec![5, 0]);
         vec![
             page(a),
             read(a, 0x3D, 8),
-            Expect::write_read(a, vec![0x39], vec![5, 0]),
+            status,
+            Expect::read(a, vec![5, 0]),
         ]
     });
     script
