@@ -103,7 +103,7 @@ impl<D: Device> Line<D> {
     /// Takes what fits of `bytes` into the client's send queue at `now`; returns how many.
     pub fn write(&mut self, bytes: &[u8], now: Instant) -> usize {
         self.run_until(now);
-        let count = bytes.len().min(QUEUE - self.to_device.len().min(QUEUE));
+        let count = bytes.len().min(self.room());
         for &byte in bytes.iter().take(count) {
             self.client_busy = self.client_busy.max(ns(now)) + character_ns(self.baud);
             self.to_device.push_back(Flying {
@@ -114,6 +114,16 @@ impl<D: Device> Line<D> {
         }
         self.sent += count as u64;
         count
+    }
+
+    /// How many bytes the client's send queue still takes.
+    pub fn room(&self) -> usize {
+        QUEUE.saturating_sub(self.to_device.len())
+    }
+
+    /// Whether bytes are on their way to the client.
+    pub fn is_sending(&self) -> bool {
+        !self.to_client.is_empty()
     }
 
     /// How many bytes have arrived at the client by `now`.
