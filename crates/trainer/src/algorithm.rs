@@ -4,7 +4,10 @@
 //! All samples and pairs are in network units; [`InUnits`] lets an operator speak radians and counts.
 
 mod check;
+pub mod checkpoint;
 mod settings;
+#[cfg(test)]
+mod tests;
 
 pub use check::{Error, Warning};
 pub use settings::{PairPlan, Plan, Schedule, Settings};

@@ -1,4 +1,5 @@
 //! The fast f32 cost and gradient against automatic differentiation (golden cases) and the f64 reference.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

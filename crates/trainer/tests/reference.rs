@@ -1,4 +1,5 @@
 //! The reference cost, optimiser and measures against automatic differentiation (golden cases) and central differences.
+#![allow(clippy::unwrap_used)]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! Reads the golden cases made by automatic differentiation in another language.
+#![allow(clippy::unwrap_used)]
 #![allow(dead_code)]
 
 use serde_json::Value;

@@ -1,0 +1,193 @@
+//! Stopping and going on later, bit for bit: weights, optimiser state, pairs and epoch in one safetensors file.
+
+use super::{Settings, Trainer};
+use crate::data::{Matrix, Pairs, sha256};
+use crate::optimizer::Nadam;
+use crate::whole_file;
+use safetensors::tensor::{Dtype, SafeTensors, TensorView};
+use sha2::{Digest, Sha256};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+/// Version of this file's meaning.
+const VERSION: &str = "1";
+
+/// Why a checkpoint cannot be written or used.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file cannot be read or written.
+    #[error("cannot {verb} the checkpoint {}: {source}; check the path and that you may use it", file.display())]
+    File {
+        /// `read` or `write`.
+        verb: &'static str,
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not a checkpoint, or damaged.
+    #[error("not a usable checkpoint ({why}); start the training afresh")]
+    Broken {
+        /// What is wrong with it.
+        why: String,
+    },
+    /// Of other samples.
+    #[error("the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected}); use the samples it was made with")]
+    OtherData {
+        /// First digits in the file.
+        found: String,
+        /// First digits of the samples at hand.
+        expected: String,
+    },
+    /// Of other settings.
+    #[error("the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed); use those it was made with")]
+    OtherSettings,
+}
+
+fn broken(why: impl Into<String>) -> Error {
+    Error::Broken { why: why.into() }
+}
+
+/// What must not change between stop and resumption: everything but threads and reports.
+fn fingerprint(settings: &Settings) -> String {
+    let same = Settings {
+        threads: 0,
+        report_every: 0,
+        ..settings.clone()
+    };
+    let hash = Sha256::digest(format!("{same:?}").as_bytes());
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+impl Trainer {
+    /// Writes a checkpoint, whole or not at all.
+    ///
+    /// # Errors
+    /// [`Error::File`].
+    pub fn save_checkpoint(&self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        whole_file::write(path, &self.checkpoint()?).map_err(|source| Error::File {
+            verb: "write",
+            file: path.to_owned(),
+            source,
+        })
+    }
+
+    /// Goes on where a checkpoint of the same samples and settings stopped.
+    ///
+    /// # Errors
+    /// Any of [`Error`]; then nothing has changed.
+    pub fn load_checkpoint(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
+        let path = path.as_ref();
+        let bytes = std::fs::read(path).map_err(|source| Error::File {
+            verb: "read",
+            file: path.to_owned(),
+            source,
+        })?;
+        self.resume(&bytes)
+    }
+
+    /// The checkpoint's bytes.
+    ///
+    /// # Errors
+    /// [`Error::Broken`] if the library refuses to write it.
+    pub fn checkpoint(&self) -> Result<Vec<u8>, Error> {
+        let nadam = self.engine.nadam();
+        let arrays = [
+            ("parameters", self.engine.parameters()),
+            ("mean", &nadam.mean),
+            ("square", &nadam.square),
+            ("pair.inputs", &self.pairs.inputs.data),
+            ("pair.targets", &self.pairs.targets.data),
+        ];
+        let arrays = arrays.map(|(name, values)| {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            (name, values.len(), bytes)
+        });
+        let views: Result<Vec<_>, _> = arrays
+            .iter()
+            .map(|(name, length, bytes)| {
+                Ok((*name, TensorView::new(Dtype::F32, vec![*length], bytes)?))
+            })
+            .collect();
+        let words = [
+            ("version", VERSION.to_owned()),
+            ("epoch", self.epoch.to_string()),
+            ("steps", nadam.steps.to_string()),
+            ("pairs", self.pairs.inputs.rows.to_string()),
+            ("data_sha256", sha256(&[&self.q, &self.x])),
+            ("settings_sha256", fingerprint(&self.settings)),
+        ];
+        let words = words.map(|(key, value)| (key.to_owned(), value));
+        let views = views.map_err(|e: safetensors::SafeTensorError| broken(e.to_string()))?;
+        safetensors::serialize(views, Some(HashMap::from(words))).map_err(|e| broken(e.to_string()))
+    }
+
+    /// Goes on from a checkpoint's bytes.
+    ///
+    /// # Errors
+    /// [`Error::Broken`], [`Error::OtherData`], [`Error::OtherSettings`]; then nothing has changed.
+    pub fn resume(&mut self, bytes: &[u8]) -> Result<(), Error> {
+        let (_, header) =
+            SafeTensors::read_metadata(bytes).map_err(|e| broken(e.to_string()))?;
+        let words = header.metadata().clone().unwrap_or_default();
+        let word = |key: &str| {
+            let word = words.get(key);
+            word.ok_or_else(|| broken(format!("no '{key}' in its header")))
+        };
+        let number = |key: &str| {
+            let number = word(key)?.parse::<u64>();
+            number.map_err(|_| broken(format!("'{key}' is not a number")))
+        };
+        if word("version")? != VERSION {
+            return Err(broken(format!("version {}", word("version")?)));
+        }
+        let (found, expected) = (word("data_sha256")?, sha256(&[&self.q, &self.x]));
+        if *found != expected {
+            let start = |digits: &str| digits.chars().take(8).collect();
+            return Err(Error::OtherData {
+                found: start(found),
+                expected: start(&expected),
+            });
+        }
+        if *word("settings_sha256")? != fingerprint(&self.settings) {
+            return Err(Error::OtherSettings);
+        }
+        let tensors = SafeTensors::deserialize(bytes).map_err(|e| broken(e.to_string()))?;
+        let array = |name: &str| floats(&tensors, name);
+        let rows = number("pairs")? as usize;
+        let matrix = |name: &str, cols: usize| {
+            let matrix = Matrix::from_vec(rows, cols, array(name)?);
+            matrix.ok_or_else(|| broken(format!("'{name}' has another size than its header says")))
+        };
+        let pairs = Pairs {
+            inputs: matrix("pair.inputs", self.q.cols)?,
+            targets: matrix("pair.targets", self.x.cols)?,
+        };
+        let nadam = Nadam {
+            steps: number("steps")?,
+            mean: array("mean")?,
+            square: array("square")?,
+        };
+        let epoch = number("epoch")? as usize;
+        if !self.engine.restore(array("parameters")?, nadam) {
+            return Err(broken("another number of weights"));
+        }
+        self.engine.set_pairs(&pairs.inputs, &pairs.targets);
+        (self.pairs, self.epoch) = (pairs, epoch);
+        Ok(())
+    }
+}
+
+fn floats(tensors: &SafeTensors<'_>, name: &str) -> Result<Vec<f32>, Error> {
+    let tensor = tensors.tensor(name).map_err(|e| broken(e.to_string()))?;
+    if tensor.dtype() != Dtype::F32 {
+        return Err(broken(format!("'{name}' is not F32")));
+    }
+    let values = tensor.data().as_chunks::<4>().0.iter();
+    let values: Vec<f32> = values.map(|bytes| f32::from_le_bytes(*bytes)).collect();
+    if values.iter().all(|v| v.is_finite()) {
+        return Ok(values);
+    }
+    Err(broken(format!("'{name}' holds a value that is not finite")))
+}
