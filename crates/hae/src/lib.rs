@@ -28,9 +28,11 @@
 pub mod image;
 pub mod reference;
 
+mod kernel;
 mod map;
 
-pub use map::{INPUT_LIMIT, InputError, Map};
+pub use kernel::{Kernel, PackedBuffer, packed_len};
+pub use map::{INPUT_LIMIT, InputError, Map, RepackError};
 
 /// Lanes of the output sums; hidden units are padded to a multiple of it.
 pub const LANES: usize = 16;

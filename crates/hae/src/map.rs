@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use crate::image::{self, Checked, Error, HEADER_LEN, JointOrder, lane_words, record_words};
-use crate::{LANES, units_per_lane};
+use crate::image::{self, Checked, Error, HEADER_LEN, JointOrder};
+use crate::kernel::{Kernel, Weights};
 
 /// Largest magnitude of an input: 2π rad (as f32, 6.2831855).
 pub const INPUT_LIMIT: f32 = core::f32::consts::TAU;
@@ -34,14 +34,10 @@ impl core::error::Error for InputError {}
 /// It borrows its weights; making one from checked bytes costs a few comparisons.
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'w, const Q: usize, const H: usize, const X: usize> {
-    lanes: &'w [f32],
-    b2: &'w [f32; X],
+    weights: Weights<'w, Q, H, X>,
 }
 
 impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
-    /// Hidden units in one lane.
-    const UNITS: usize = units_per_lane(H);
-
     /// Checks the image at the start of `bytes` completely and makes the map. The image's joint order must be
     /// [`JointOrder::natural`] for `Q` inputs.
     ///
@@ -83,15 +79,60 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
     pub fn view(bytes: &'w [u8], checked: &Checked) -> Option<Self> {
         if [checked.inputs, checked.hidden, checked.outputs] != [Q, H, X]
             || image::stated_crc(bytes) != checked.crc
-            || !bytes.as_ptr().addr().is_multiple_of(image::ALIGNMENT)
         {
             return None;
         }
-        let words: &[f32] =
-            bytemuck::try_cast_slice(bytes.get(HEADER_LEN..checked.length)?).ok()?;
-        let lanes = words.get(..lane_words(Q, H, X))?;
-        let b2 = words.get(lanes.len()..lanes.len() + X)?.try_into().ok()?;
-        Some(Self { lanes, b2 })
+        let words = bytemuck::try_cast_slice(bytes.get(HEADER_LEN..checked.length)?).ok()?;
+        Some(Self {
+            weights: Weights::in_image(words)?,
+        })
+    }
+
+    /// The same map with its weights copied to `buffer` in the order of this machine's fastest kernel, which is chosen
+    /// here, once. `buffer` holds [`packed_len`](crate::packed_len) values or more and starts at a multiple of 64 bytes
+    /// ([`PackedBuffer`](crate::PackedBuffer)).
+    ///
+    /// # Errors
+    /// As [`Map::repack_for`].
+    pub fn repack<'b>(&self, buffer: &'b mut [f32]) -> Result<Map<'b, Q, H, X>, RepackError> {
+        self.repack_for(Kernel::best(), buffer)
+    }
+
+    /// As [`Map::repack`] for a kernel that is named.
+    ///
+    /// # Errors
+    /// A buffer that is too short or not aligned; a kernel that this machine cannot run or that has no order of its own;
+    /// a map that was repacked already.
+    pub fn repack_for<'b>(
+        &self,
+        kernel: Kernel,
+        buffer: &'b mut [f32],
+    ) -> Result<Map<'b, Q, H, X>, RepackError> {
+        let needed = crate::packed_len(Q, H, X);
+        let found = buffer.len();
+        let offset = buffer.as_ptr().addr() % image::ALIGNMENT;
+        if found < needed {
+            return Err(RepackError::Length { found, needed });
+        }
+        if offset != 0 {
+            return Err(RepackError::Alignment { offset });
+        }
+        match self.weights.repack(kernel, buffer) {
+            Some(weights) => Ok(Map { weights }),
+            None => Err(RepackError::Kernel { kernel }),
+        }
+    }
+
+    /// The same map with the portable kernel; `None` if it was repacked for another.
+    pub fn portable(self) -> Option<Self> {
+        Some(Self {
+            weights: self.weights.portable()?,
+        })
+    }
+
+    /// The kernel that computes this map.
+    pub fn kernel(&self) -> Kernel {
+        self.weights.kernel()
     }
 
     /// f(q): radians in, counts out, in exactly the [arithmetic of this crate](crate#the-arithmetic). The outputs are
@@ -99,55 +140,80 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
     ///
     /// # Errors
     /// An input that is NaN, infinite or beyond ±2π.
+    #[inline]
     pub fn eval(&self, q: &[f32; Q]) -> Result<[f32; X], InputError> {
-        check_inputs(q)?;
-        let mut sums = [[0.0; LANES]; X];
-        for (lane, record) in self.lanes.chunks_exact(record_words(Q, H, X)).enumerate() {
-            self.lane(record, q, lane, &mut sums);
+        if !all_in_range(q) {
+            return Err(first_out_of_range(q));
         }
-        let mut y = [0.0; X];
-        for ((y, sums), b2) in y.iter_mut().zip(&mut sums).zip(self.b2) {
-            *y = halving_tree(sums) + b2;
-        }
-        Ok(y)
+        Ok(self.weights.eval(q))
     }
+}
 
-    fn lane(&self, record: &[f32], q: &[f32; Q], lane: usize, sums: &mut [[f32; LANES]; X]) {
-        let column = |m: usize| record.iter().skip(m).step_by(Self::UNITS);
-        for (m, &b1) in record.iter().enumerate().take(Self::UNITS) {
-            let mut z = b1;
-            for (w, q) in column(m).skip(1).zip(q) {
-                z += w * q;
+/// Why a map could not be repacked.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RepackError {
+    /// The buffer is too short.
+    Length {
+        /// Its length in values.
+        found: usize,
+        /// The length needed.
+        needed: usize,
+    },
+    /// The buffer does not start at a multiple of 64 bytes.
+    Alignment {
+        /// Its address modulo 64.
+        offset: usize,
+    },
+    /// This machine cannot run the kernel, or the map is not in the image's order any more.
+    Kernel {
+        /// The kernel asked for.
+        kernel: Kernel,
+    },
+}
+
+impl fmt::Display for RepackError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Length { found, needed } => {
+                write!(
+                    f,
+                    "a buffer of {found} values is too short to repack the map, {needed} are needed"
+                )
             }
-            let h = if z > 0.0 { z } else { 0.0 };
-            for (w, sums) in column(m).skip(1 + Q).zip(sums.iter_mut()) {
-                sums[lane] += w * h;
+            Self::Alignment { offset } => {
+                write!(
+                    f,
+                    "the buffer starts {offset} bytes past a multiple of 64: use hae::PackedBuffer"
+                )
+            }
+            Self::Kernel { kernel } => {
+                write!(
+                    f,
+                    "the map cannot be repacked for {kernel:?} here: use Kernel::best() on a map from its image"
+                )
             }
         }
     }
 }
 
-/// Refuses inputs that are not angles within ±2π.
-fn check_inputs<const Q: usize>(q: &[f32; Q]) -> Result<(), InputError> {
+impl core::error::Error for RepackError {}
+
+/// True if every input is an angle within ±2π. Without branches: for finite and non-finite values alike, the magnitudes
+/// are in the order of their bits.
+#[inline]
+fn all_in_range(q: &[f32]) -> bool {
+    let limit = INPUT_LIMIT.to_bits();
+    let beyond = q.iter().fold(0, |beyond, q| {
+        beyond | limit.wrapping_sub(q.to_bits() & 0x7fff_ffff)
+    });
+    beyond & 0x8000_0000 == 0
+}
+
+#[cold]
+fn first_out_of_range(q: &[f32]) -> InputError {
+    let mut inputs = q.iter().copied().enumerate();
     // No range contains a NaN.
-    match q
-        .iter()
-        .position(|q| !(-INPUT_LIMIT..=INPUT_LIMIT).contains(q))
-    {
-        Some(input) => Err(InputError {
-            input,
-            value: q[input],
-        }),
-        None => Ok(()),
-    }
-}
-
-/// Sums 16 lanes: distance 8, 4, 2, 1.
-fn halving_tree(sums: &mut [f32; LANES]) -> f32 {
-    for distance in [8, 4, 2, 1] {
-        for k in 0..distance {
-            sums[k] += sums[k + distance];
-        }
-    }
-    sums[0]
+    let found = inputs.find(|(_, q)| !(-INPUT_LIMIT..=INPUT_LIMIT).contains(q));
+    let (input, value) = found.unwrap_or((0, f32::NAN));
+    InputError { input, value }
 }

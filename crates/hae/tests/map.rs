@@ -2,8 +2,8 @@
 
 mod common;
 
-use common::{Network, rng, vector};
-use hae::{InputError, Map, reference};
+use common::{AlignedFloats, Network, rng, vector};
+use hae::{InputError, Kernel, Map, RepackError, packed_len, reference};
 
 fn reference(network: &Network, q: &[f32]) -> Vec<u32> {
     let mut y = vec![0.0; network.outputs];
@@ -15,11 +15,34 @@ fn check<const Q: usize, const H: usize, const X: usize>(seed: u64, samples: usi
     let network = Network::random(seed, [Q, H, X]);
     let image = network.image();
     let map = Map::<Q, H, X>::from_image(&image).expect("a sound image");
+    let mut buffers =
+        Kernel::ALL.map(|kernel| (kernel, AlignedFloats::zeroed(packed_len(Q, H, X))));
+    let maps: Vec<_> = buffers
+        .iter_mut()
+        .filter_map(|(kernel, buffer)| map.repack_for(*kernel, buffer).ok())
+        .collect();
     let rng = &mut rng(seed + 100);
-    for _ in 0..samples {
-        let q: [f32; Q] = vector(rng, Q, -6.2, 6.2).try_into().expect("Q values");
+    for sample in 0..samples {
+        let mut q: [f32; Q] = vector(rng, Q, -6.2, 6.2).try_into().expect("Q values");
+        if sample % 10 == 0 {
+            let edges = [
+                0.0,
+                -0.0,
+                1e-45,
+                -1e-45,
+                f32::MIN_POSITIVE,
+                6.283_185_5,
+                -6.283_185_5,
+            ];
+            q[sample / 10 % Q] = edges[sample / 10 % edges.len()];
+        }
         let y = map.eval(&q).expect("inputs in range");
-        assert_eq!(y.map(f32::to_bits)[..], reference(&network, &q)[..]);
+        let bits = reference(&network, &q);
+        assert_eq!(y.map(f32::to_bits)[..], bits[..]);
+        for map in &maps {
+            let y = map.eval(&q).expect("inputs in range");
+            assert_eq!(y.map(f32::to_bits)[..], bits[..], "{:?}", map.kernel());
+        }
         for (y, exact) in y.iter().zip(network.eval_f64(&q)) {
             // 300 products of up to 12·10: rounding errors stay far below 0.01 counts.
             assert!((f64::from(*y) - exact).abs() < 1e-2, "{y} {exact}");
@@ -93,4 +116,67 @@ fn reference_refuses_lengths_that_do_not_fit() {
     assert!(reference::eval(&network.parameters(), &[0.0], &mut y).is_none());
     assert!(reference::eval(&network.parameters(), &[0.0, 0.0], &mut []).is_none());
     assert!(reference::eval(&network.parameters(), &[0.0, 0.0], &mut y).is_some());
+}
+
+#[test]
+fn the_best_kernel_is_one_that_this_machine_runs() {
+    assert!(Kernel::best().is_supported());
+    assert!(Kernel::Portable.is_supported());
+    assert!(!Kernel::CortexM4f.is_supported(), "on a host");
+    if cfg!(target_arch = "x86_64") && !cfg!(miri) {
+        assert_eq!(
+            Kernel::Avx2.is_supported(),
+            std::is_x86_feature_detected!("avx2")
+        );
+        assert_eq!(
+            Kernel::Avx512.is_supported(),
+            std::is_x86_feature_detected!("avx512f")
+        );
+        assert!(Kernel::Sse2.is_supported());
+    }
+    let image = Network::random(9, [3, 300, 2]).image();
+    let map = Map::<3, 300, 2>::from_image(&image).expect("a sound image");
+    let mut buffer = AlignedFloats::zeroed(packed_len(3, 300, 2));
+    assert_eq!(
+        map.repack(&mut buffer).expect("room").kernel(),
+        Kernel::best()
+    );
+}
+
+#[test]
+fn repacking_refuses_what_cannot_work() {
+    let image = Network::random(10, [3, 20, 2]).image();
+    let map = Map::<3, 20, 2>::from_image(&image).expect("a sound image");
+    let needed = packed_len(3, 20, 2);
+    let mut buffer = AlignedFloats::zeroed(needed + 1);
+    let error = map
+        .repack(&mut buffer[..needed - 1])
+        .expect_err("too short");
+    assert_eq!(
+        error,
+        RepackError::Length {
+            found: needed - 1,
+            needed
+        }
+    );
+    let error = map.repack(&mut buffer[1..]).expect_err("not aligned");
+    assert_eq!(error, RepackError::Alignment { offset: 4 });
+    let error = map
+        .repack_for(Kernel::CortexM4f, &mut buffer)
+        .expect_err("on a host");
+    assert_eq!(
+        error,
+        RepackError::Kernel {
+            kernel: Kernel::CortexM4f
+        }
+    );
+    let packed = map.repack(&mut buffer).expect("room");
+    if packed.kernel() != Kernel::Portable {
+        let mut second = AlignedFloats::zeroed(needed);
+        assert!(
+            packed.repack(&mut second).is_err(),
+            "not in the image's order any more"
+        );
+        assert!(packed.portable().is_none());
+    }
 }

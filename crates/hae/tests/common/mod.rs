@@ -130,3 +130,32 @@ impl core::ops::DerefMut for Aligned {
         &mut self.bytes[self.start..self.start + self.len]
     }
 }
+
+/// Floats that start at a multiple of 64 bytes.
+pub struct AlignedFloats {
+    values: Vec<f32>,
+    start: usize,
+    len: usize,
+}
+
+impl AlignedFloats {
+    pub fn zeroed(len: usize) -> Self {
+        let values = vec![0.0; len + 16];
+        let start = (values.as_ptr() as usize).wrapping_neg() % 64 / 4;
+        Self { values, start, len }
+    }
+}
+
+impl core::ops::Deref for AlignedFloats {
+    type Target = [f32];
+
+    fn deref(&self) -> &[f32] {
+        &self.values[self.start..self.start + self.len]
+    }
+}
+
+impl core::ops::DerefMut for AlignedFloats {
+    fn deref_mut(&mut self) -> &mut [f32] {
+        &mut self.values[self.start..self.start + self.len]
+    }
+}
