@@ -257,3 +257,72 @@ fn the_glove_changes_its_baud_on_a_terminal() {
     let id = client.ask(&[0x53, 0x50, 0x01, 0x00, 0x53, 0x51, 0x04, 0x50], 4);
     assert_eq!(id, [0xA0, 0xFB, 0x32, 0x0F]);
 }
+
+/// A scan as a client makes it: select, two plain reads, eight times.
+fn scan(client: &Client) {
+    for channel in 0..8u8 {
+        for (request, count) in [
+            (
+                &[0x53, 0xE0, 0x01, 1 << channel, 0x50, 0x53, 0x51, 0x08, 0x50][..],
+                8,
+            ),
+            (&[0x53, 0x53, 0x08, 0x50][..], 8),
+        ] {
+            client.write(request);
+            assert_eq!(client.read(count, Duration::from_secs(1)).len(), count);
+        }
+    }
+}
+
+#[test]
+#[ignore = "prints rates: cargo test -p rig --test pty -- --ignored --nocapture"]
+fn rates_on_a_terminal() {
+    for baud in [115_200, 460_800] {
+        let glove = VirtualGlove::new(Box::new(|_| [0.0; 25]), rig::glove::Config::at_baud(baud));
+        let handle = PtyDevice::spawn(Box::new(glove), None).unwrap();
+        let client = Client::open(handle.path(), baud);
+        std::thread::sleep(Duration::from_millis(700));
+        client.write(&[0x57, 0x07, 0x05, 0x08, 0x05, 0x50]);
+        let start = Instant::now();
+        (0..50).for_each(|_| scan(&client));
+        println!(
+            "glove at {baud}: {:.1} scans/s",
+            50.0 / start.elapsed().as_secs_f64()
+        );
+    }
+    let (_, handle) = gripper(Config::default());
+    let client = Client::open(handle.path(), 115_200);
+    let mut cycle = vec![9, 0x17, 7, 0xD0, 0, 8, 3, 0xE8, 0, 8, 16];
+    cycle.extend([0; 16]);
+    let cycle = framed(&cycle);
+    let start = Instant::now();
+    for _ in 0..200 {
+        client.write(&cycle);
+        assert_eq!(client.read(21, Duration::from_secs(1)).len(), 21);
+    }
+    println!(
+        "gripper at 115200: {:.1} cycles/s",
+        200.0 / start.elapsed().as_secs_f64()
+    );
+}
+
+#[test]
+#[ignore = "prints how far ahead of the clock it simulates"]
+fn speed_on_a_virtual_clock() {
+    let mut bench = common::Bench::new(Config::default());
+    bench.activate();
+    let mut cycle = vec![9, 0x17, 7, 0xD0, 0, 8, 3, 0xE8, 0, 8, 16, 0x09, 0x0C, 0];
+    cycle.extend([
+        200, 255, 100, 200, 255, 100, 200, 255, 100, 137, 255, 100, 0,
+    ]);
+    let cycle = framed(&cycle);
+    let (start, from) = (Instant::now(), bench.clock.now().as_ticks());
+    for _ in 0..10_000 {
+        assert_eq!(bench.ask(&cycle).len(), 21);
+    }
+    let simulated = (bench.clock.now().as_ticks() - from) as f64 * 1e-6;
+    println!(
+        "gripper: {:.0} times real time",
+        simulated / start.elapsed().as_secs_f64()
+    );
+}

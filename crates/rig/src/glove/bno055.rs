@@ -152,15 +152,15 @@ impl Bno055 {
         true
     }
 
-    /// A write transaction: the first byte sets the pointer, the others go into registers.
+    /// A write transaction: the first byte sets the pointer, the others go into registers from there
+    /// on. The pointer stays at the address that was written: every later read starts there again.
     pub fn write(&mut self, bytes: &[u8], now: Instant) {
         let Some((pointer, data)) = bytes.split_first() else {
             return;
         };
         self.pointer = pointer & 0x7F;
-        for byte in data {
-            self.write_register(self.pointer, *byte, now);
-            self.pointer = (self.pointer + 1) & 0x7F;
+        for (address, byte) in addresses_from(self.pointer).zip(data) {
+            self.write_register(address, *byte, now);
         }
     }
 
@@ -176,12 +176,10 @@ impl Bno055 {
             self.reset();
         }
         self.fuse(now, orientation);
-        let first = self.pointer;
-        for slot in out.iter_mut() {
-            *slot = self.register(self.page, self.pointer);
-            self.pointer = (self.pointer + 1) & 0x7F;
+        for (address, slot) in addresses_from(self.pointer).zip(out.iter_mut()) {
+            *slot = self.register(self.page, address);
         }
-        self.flip_sign(first, out);
+        self.flip_sign(self.pointer, out);
     }
 
     /// A register as a read would give it, without moving the pointer.
@@ -334,6 +332,11 @@ impl Bno055 {
             self.faults.flip = Some((component, left - 1));
         }
     }
+}
+
+/// Register addresses from `first` on: 00 follows 7F.
+fn addresses_from(first: u8) -> impl Iterator<Item = u8> {
+    (first..=0x7F).chain((0..=0x7F).cycle())
 }
 
 /// The unique id of sensor `index`, byte `i`: any bytes, different for each sensor.
