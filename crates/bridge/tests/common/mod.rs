@@ -1,6 +1,8 @@
 //! What several tests share: a flash slot, and maps whose answer is known.
 #![allow(dead_code, reason = "each test takes what it needs")]
 
+pub mod bench;
+
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use rig::flash::{Nor, Power};

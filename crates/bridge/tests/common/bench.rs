@@ -1,0 +1,174 @@
+//! The whole loop on rig's virtual devices and clock: glove bytes in, gripper bytes out.
+
+use super::{Flash, hand_image};
+use bridge::app::expected;
+use bridge::event::{Event, Kind};
+use bridge::{App, Config, Instant, Platform, Settings, State, WeightsStore};
+use gripper::driver::ThreeFinger;
+use rig::flash::Power;
+use rig::glove::VirtualGlove;
+use rig::gripper::VirtualGripper;
+use rig::{Clock, MemoryWire};
+use std::sync::{Arc, Mutex};
+
+pub const MS: u64 = 1_000;
+pub const S: u64 = 1_000_000;
+
+/// Time moves to the next event; a step of the loop costs 50 µs.
+pub struct Virtual(pub Clock);
+
+impl Platform for Virtual {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        self.0.advance(rig::Duration::from_micros(50));
+        if due > self.0.now() {
+            self.0.wait_until(due);
+        }
+    }
+}
+
+pub type Loop = App<Virtual, MemoryWire, ThreeFinger<MemoryWire>, Flash, 4>;
+
+/// The loop and what it is connected to.
+pub struct Bench {
+    pub clock: Clock,
+    pub glove: VirtualGlove,
+    pub glove_wire: MemoryWire,
+    pub gripper: VirtualGripper,
+    pub gripper_wire: MemoryWire,
+    pub pose: Arc<Mutex<[f32; 25]>>,
+    pub app: Loop,
+    /// The person's hand on the clutch.
+    pub clutch: bool,
+    pub events: Vec<Event>,
+    beat: u64,
+}
+
+impl Bench {
+    pub fn new(settings: Settings<4>) -> Self {
+        Self::with(
+            settings,
+            Some(hand_image(1)),
+            rig::gripper::Config::default(),
+        )
+    }
+
+    pub fn with(
+        settings: Settings<4>,
+        image: Option<Vec<u8>>,
+        config: rig::gripper::Config,
+    ) -> Self {
+        let clock = Clock::new();
+        let pose = Arc::new(Mutex::new([0.0; 25]));
+        let shown = pose.clone();
+        let glove = VirtualGlove::new(
+            Box::new(move |_: f64| *shown.lock().expect("not poisoned")),
+            rig::glove::Config::at_baud(115_200),
+        );
+        let glove_wire = MemoryWire::new(&clock, glove.clone(), 115_200);
+        let gripper = VirtualGripper::new(config);
+        let gripper_wire = MemoryWire::new(&clock, gripper.clone(), 115_200);
+        let power = Power::new();
+        let slots = [Flash::new(64 * 1024, &power), Flash::new(64 * 1024, &power)];
+        let mut store = WeightsStore::new(slots, expected(4));
+        if let Some(image) = image {
+            store.begin(image.len()).expect("room");
+            store.chunk(0, &image).expect("bytes");
+            store.commit().expect("a sound image");
+        }
+        let app = App::new(
+            Virtual(clock.clone()),
+            glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
+            ThreeFinger::new(gripper_wire.clone(), gripper::driver::Config::default()),
+            store,
+            Config::new(settings).expect("in range"),
+        );
+        Self {
+            clock,
+            glove,
+            glove_wire,
+            gripper,
+            gripper_wire,
+            pose,
+            app,
+            clutch: false,
+            events: Vec::new(),
+            beat: 0,
+        }
+    }
+
+    pub fn now(&self) -> u64 {
+        self.clock.now().as_ticks()
+    }
+
+    pub fn set_pose(&self, pose: [f32; 25]) {
+        *self.pose.lock().expect("not poisoned") = pose;
+    }
+
+    /// One step of the loop and the wait after it.
+    pub fn step(&mut self) {
+        if self.clutch && self.now() >= self.beat {
+            self.app.engage();
+            self.beat = self.now() + 100 * MS;
+        }
+        let due = self.app.step();
+        while let Some(event) = self.app.next_event() {
+            self.events.push(event);
+        }
+        self.app.platform_mut().wait_until(due);
+    }
+
+    pub fn run(&mut self, us: u64) {
+        let end = self.now() + us;
+        while self.now() < end {
+            self.step();
+        }
+    }
+
+    /// Runs until `found`; panics after 20 s.
+    pub fn until(&mut self, what: &str, mut found: impl FnMut(&Self) -> bool) {
+        let end = self.now() + 20 * S;
+        while !found(self) {
+            assert!(
+                self.now() < end,
+                "never {what}: {:?}\n{:#?}",
+                self.app.telemetry(),
+                self.events
+            );
+            self.step();
+        }
+    }
+
+    pub fn state(&self) -> State {
+        self.app.telemetry().state
+    }
+
+    /// Both devices answer, the gripper is activated.
+    pub fn ready(&mut self) {
+        self.app.activate();
+        self.until("ready", |bench| {
+            let telemetry = bench.app.telemetry();
+            let activated = telemetry
+                .status
+                .is_some_and(|status| status.activation == gripper::Activation::Ready);
+            activated && telemetry.frame_sequence > 0
+        });
+    }
+
+    pub fn follow(&mut self) {
+        self.clutch = true;
+        self.until("following", |bench| bench.state() == State::Following);
+    }
+
+    pub fn release(&mut self) {
+        self.clutch = false;
+        self.app.release();
+    }
+
+    pub fn told(&self, kind: Kind) -> bool {
+        self.events.iter().any(|event| event.kind == kind)
+    }
+}
