@@ -1,0 +1,135 @@
+//! From a shown hand to a standing gripper, through every byte: the tool's training, the weights store, the virtual
+//! sensors behind the serial bridge, the map, the supervisor, Modbus, the virtual gripper's own fingers.
+
+use bridge::{App, Config, Instant, Platform, State, WeightsStore};
+use gauntlet::interrupt::Interrupt;
+use gauntlet::poses::Motion;
+use gauntlet::slots::MemorySlot;
+use gauntlet::training::{Request, train};
+use glove::hand::LIMITS;
+use glove::scan::Scanner;
+use gripper::driver::ThreeFinger;
+use rig::glove::VirtualGlove;
+use rig::gripper::VirtualGripper;
+use rig::{Clock, MemoryWire};
+use trainer::algorithm::Schedule;
+use trainer::motion::Generator;
+
+const SEED: u64 = 1;
+const BAUD: u32 = 115_200;
+/// The heartbeat of the clutch, microseconds.
+const HEARTBEAT: u64 = 100_000;
+/// Long enough for the slowest way through: blend, filter, and a full stroke.
+const SETTLE: u64 = 5_000_000;
+
+struct Machine(Clock);
+
+impl Platform for Machine {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        let soonest = Instant::from_ticks(self.0.now().as_ticks() + 1);
+        self.0.wait_until(due.max(soonest));
+    }
+}
+
+type Bridge = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, MemorySlot, 4>;
+
+struct Bench {
+    app: Bridge,
+    clock: Clock,
+    glove: VirtualGlove,
+    gripper: VirtualGripper,
+}
+
+impl Bench {
+    fn new(image: &[u8], pose: [f32; 25]) -> Self {
+        let clock = Clock::new();
+        let glove = VirtualGlove::new(Box::new(move |_| pose), rig::glove::Config::at_baud(BAUD));
+        let gripper = VirtualGripper::new(rig::gripper::Config::default());
+        let glove_wire = MemoryWire::new(&clock, glove.clone(), BAUD);
+        let gripper_wire = MemoryWire::new(&clock, gripper.clone(), BAUD);
+        let mut store =
+            WeightsStore::new([MemorySlot::new(), MemorySlot::new()], bridge::app::expected(4));
+        store.begin(image.len()).unwrap();
+        store.chunk(0, image).unwrap();
+        store.commit().unwrap();
+        let app = App::new(
+            Machine(clock.clone()),
+            Scanner::new(glove_wire, glove::scan::Config::default()),
+            ThreeFinger::new(gripper_wire, gripper::driver::Config::default()),
+            store,
+            Config::default(),
+        );
+        Self { app, clock, glove, gripper }
+    }
+
+    /// Runs for `time` microseconds with the clutch open or closed.
+    fn run(&mut self, time: u64, clutch: bool) {
+        let end = self.clock.now().as_ticks() + time;
+        let mut beat = 0;
+        while self.clock.now().as_ticks() < end {
+            let now = self.clock.now().as_ticks();
+            if clutch && now >= beat {
+                self.app.engage();
+                beat = now + HEARTBEAT;
+            }
+            let due = self.app.step();
+            self.app.platform_mut().wait_until(due.min(Instant::from_ticks(end)));
+        }
+    }
+
+    fn show(&mut self, pose: [f32; 25]) {
+        self.glove.set_pose(Box::new(move |_| pose));
+        self.run(SETTLE, true);
+    }
+}
+
+#[test]
+fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
+    let outcome = train(
+        &Request {
+            motion: &Motion::Generated { seed: SEED },
+            schedule: Schedule::Fast,
+            epochs: None,
+            pairs: 8,
+            start_pairs: true,
+            seed: SEED,
+            quiet: true,
+        },
+        &Interrupt::never().unwrap(),
+    )
+    .unwrap();
+    println!("seed {SEED}: {:?}", outcome.quality);
+    let image = gauntlet::model::image(&outcome.model).unwrap();
+    let hand = Generator::new(&LIMITS, SEED);
+
+    let mut bench = Bench::new(&image, hand.flat_hand());
+    bench.run(3_000_000, false);
+    bench.app.activate();
+    bench.run(15_000_000, false);
+    let standing = bench.gripper.positions();
+    assert_eq!(bench.app.telemetry().state, State::Idle);
+
+    bench.show(hand.flat_hand());
+    assert_eq!(bench.app.telemetry().state, State::Following);
+    let open = bench.gripper.positions();
+    println!("standing {standing:.0?}, flat hand {open:.0?}");
+    assert!(open[..3].iter().all(|&finger| finger <= 30.0), "flat hand: {open:?}");
+
+    bench.show(hand.fist());
+    let closed = bench.gripper.positions();
+    println!("fist {closed:.0?}");
+    assert!(closed[..3].iter().all(|&finger| finger >= 225.0), "fist: {closed:?}");
+
+    bench.show(hand.flat_hand());
+    let open = bench.gripper.positions();
+    assert!(open[..3].iter().all(|&finger| finger <= 30.0), "flat hand again: {open:?}");
+
+    let counters = bench.app.telemetry().counters;
+    assert_eq!(counters.late_steps, 0);
+    assert_eq!(counters.unusable_frames, 0);
+    assert!(counters.answered_frames >= 20 * 3 * SETTLE as u32 / 1_000_000, "{counters:?}");
+}
