@@ -223,21 +223,23 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         self.first_free(F::READS.iter().map(read), now)
     }
 
+    /// The first of `looks` that no late reply can answer; else the one whose settled debt ends
+    /// first.
     fn first_free(
         &mut self,
         looks: impl Iterator<Item = Doing<X>>,
         now: Instant,
     ) -> Option<Doing<X>> {
-        let mut settled = None;
+        let mut best: Option<(Instant, Doing<X>)> = None;
         for doing in looks {
             match self.link.debt(&doing.request(F::REGISTERS), now) {
                 Debt::None => return Some(doing),
-                Debt::Settled => {
-                    settled.get_or_insert(doing);
+                Debt::Settled { until } if best.is_none_or(|(ends, _)| until < ends) => {
+                    best = Some((until, doing))
                 }
-                Debt::Open => {}
+                Debt::Settled { .. } | Debt::Open => {}
             }
         }
-        settled
+        best.map(|(_, doing)| doing)
     }
 }

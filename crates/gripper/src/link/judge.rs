@@ -98,13 +98,14 @@ impl<S> Link<S> {
             return Verdict::More;
         };
         match Frame::new_checked(frame) {
-            Err(_) => Verdict::Wrong(Error::Crc),
-            Ok(_) if late.is_some() => Verdict::Wrong(Error::Stale),
-            Ok(frame) => match pending.check(&frame) {
-                Ok(()) => Verdict::Reply,
-                Err(field) => Verdict::Wrong(Error::Shape(field)),
+            Err(_) => return Verdict::Wrong(Error::Crc),
+            Ok(frame) => match (late, pending.check(&frame)) {
+                (None, Ok(())) => return Verdict::Reply,
+                (None, Err(field)) => return Verdict::Wrong(Error::Shape(field)),
+                (Some(owed), _) => self.owed.pay(owed),
             },
         }
+        Verdict::Wrong(Error::Stale)
     }
 
     /// Takes a copy of the request off the front. `true` while the bytes may still become one.

@@ -20,13 +20,15 @@ mod judge;
 mod owed;
 mod port;
 mod trace;
+mod types;
 
 pub use owed::Debt;
 pub use trace::{Counters, Entry, Event, TRACE_BYTES, TRACE_LEN, Trace};
+pub use types::{Config, Echo, Error, Field, PortFault, Refused};
 
-use crate::rtu::{self, Request, Response};
+use crate::rtu::{Request, Response};
 use crate::{Duration, Instant, timing};
-use embedded_io::{ErrorKind, Read, ReadReady, Write};
+use embedded_io::{Read, ReadReady, Write};
 use judge::{Pending, Verdict};
 use owed::{Owed, Signature};
 
@@ -36,170 +38,6 @@ pub const MAX_REQUEST: usize = 64;
 pub const MAX_REPLY: usize = 64;
 /// Bytes read in one poll at most: a port that never runs dry must not hold the loop.
 const POLL_BYTES: usize = 512;
-
-/// What a link needs to know about its line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Config {
-    /// The slave's address.
-    pub unit: u8,
-    /// Speed, baud.
-    pub baud: u32,
-    /// From the end of a request to the start of its reply, at most.
-    pub response: Duration,
-    /// Silence between frames.
-    pub silence: Duration,
-    /// Longest reply any request of the user has, bytes: the quarantine after a timeout.
-    pub longest_reply: usize,
-}
-
-impl Config {
-    /// The usual times for a line of `baud` (see [`timing`]).
-    #[must_use]
-    pub const fn new(unit: u8, baud: u32) -> Self {
-        let (response, silence) = (timing::RESPONSE, timing::silence(baud));
-        Self {
-            unit,
-            baud,
-            response,
-            silence,
-            longest_reply: 21,
-        }
-    }
-}
-
-/// The check a valid reply failed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Field {
-    /// Another slave's address.
-    Unit,
-    /// Another function code.
-    Function,
-    /// Another byte count.
-    ByteCount,
-    /// A bit that is always 0 is set.
-    Reserved,
-    /// A write's address, quantity or value is not what was sent; or the gripper repeats a position
-    /// nobody asked for.
-    Echo,
-}
-
-/// What failed at the port itself.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum PortFault {
-    /// Reading.
-    Read(ErrorKind),
-    /// Writing.
-    Write(ErrorKind),
-    /// The other side is gone: a read or a write of no bytes.
-    Closed,
-}
-
-/// Why a transaction has no answer.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Error {
-    /// As many bytes as the reply has, with a wrong CRC.
-    Crc,
-    /// The late reply to an earlier request.
-    Stale,
-    /// A whole frame with a right CRC that does not answer the request.
-    Shape(Field),
-    /// No whole reply in time.
-    Timeout {
-        /// Bytes that did arrive.
-        received: usize,
-    },
-    /// The device understood and said no.
-    Exception(rtu::Exception),
-    /// The line does not fall silent: so many bytes that belong to nothing.
-    Noise(u32),
-    /// The port failed.
-    Port(PortFault),
-}
-
-impl core::fmt::Display for Error {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match *self {
-            Self::Crc => write!(
-                f,
-                "the reply's CRC is wrong: check cable, ground and termination"
-            ),
-            Self::Stale => write!(
-                f,
-                "the late reply to an earlier request came: the line is slower than configured"
-            ),
-            Self::Shape(field) => {
-                let what = match field {
-                    Field::Unit => {
-                        "it comes from another slave: two masters, or another unit number"
-                    }
-                    Field::Function => "another function code",
-                    Field::ByteCount => "another byte count",
-                    Field::Reserved => "a reserved bit is set",
-                    Field::Echo => "it repeats something that was not sent",
-                };
-                write!(f, "a valid frame does not answer the request: {what}")
-            }
-            Self::Timeout { received: 0 } => {
-                write!(
-                    f,
-                    "no answer: check power, cable, baud rate and unit number"
-                )
-            }
-            Self::Timeout { received } => {
-                write!(
-                    f,
-                    "no whole answer, {received} bytes came: check baud rate and cable"
-                )
-            }
-            Self::Exception(code) => {
-                write!(
-                    f,
-                    "the device refuses with exception {:02X}, {}",
-                    code.0,
-                    code.meaning()
-                )
-            }
-            Self::Noise(n) => {
-                write!(
-                    f,
-                    "the line does not fall silent, {n} bytes nobody asked for: check baud rate and wiring"
-                )
-            }
-            Self::Port(fault) => write!(
-                f,
-                "the serial port failed ({fault:?}): unplugged? reopen it"
-            ),
-        }
-    }
-}
-
-impl core::error::Error for Error {}
-
-/// Why a request was not sent.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Refused {
-    /// A transaction, a drain or a silence is under way; ask again at [`Link::next_due`].
-    Busy,
-    /// A late reply could be taken for the answer: send one of another look, or wait.
-    Owed,
-    /// A write, while it is not known whether the adapter echoes: read once first.
-    EchoUnknown,
-    /// The request or its reply is longer than the link's buffers, or cannot be put into bytes.
-    Length,
-    /// The port failed.
-    Port(PortFault),
-}
-
-/// Whether the adapter sends back what it is given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Echo {
-    /// No read has been answered yet.
-    Unknown,
-    /// It does not.
-    Off,
-    /// It does: every reply comes after a copy of its request.
-    On,
-}
 
 #[derive(Clone, Copy, Debug)]
 enum State {
@@ -213,11 +51,12 @@ enum State {
     },
     /// The port failed, or was just opened: it is left alone until `until`, then drained.
     Resting { until: Instant },
-    /// Bytes are thrown away until `until` and a silence after `heard`.
+    /// Bytes are thrown away until `until` and a silence after `heard`. The line has been talking
+    /// without a silence since `noisy`, `thrown` bytes.
     Draining {
         until: Instant,
         heard: Instant,
-        babble_at: Instant,
+        noisy: Instant,
         thrown: u32,
     },
 }
@@ -303,6 +142,11 @@ impl<S: Read + ReadReady + Write> Link<S> {
     /// Whether a request can be sent at `now` as far as the line goes.
     pub fn is_free(&self, now: Instant) -> bool {
         matches!(self.state, State::Idle { free_at } if now >= free_at)
+    }
+
+    /// Whether the link has nothing to do: no transaction, no drain (a silence may be running).
+    pub fn is_idle(&self) -> bool {
+        matches!(self.state, State::Idle { .. })
     }
 
     /// When [`Self::poll`] or [`Self::start`] has something to do next without a byte arriving.
@@ -495,11 +339,10 @@ impl<S: Read + ReadReady + Write> Link<S> {
 
     fn begin_drain(&mut self, now: Instant, rest: Instant) {
         self.length = 0;
-        let babble_at = timing::after(now.max(rest), timing::babble(self.config.baud));
         self.state = State::Draining {
             until: rest,
             heard: now,
-            babble_at,
+            noisy: now,
             thrown: 0,
         };
     }

@@ -43,7 +43,10 @@ pub enum Debt {
     None,
     /// One was expected, but a later request has been answered since: it will not come from a slave
     /// that answers in order.
-    Settled,
+    Settled {
+        /// When the debt is forgotten. Of two settled looks the one that ends first is the safer.
+        until: Instant,
+    },
     /// One may come: the request is refused.
     Open,
 }
@@ -70,7 +73,7 @@ impl Owed {
 
     pub(super) fn debt(&self, signature: Signature) -> Debt {
         match self.0.iter().find(|entry| entry.signature == signature) {
-            Some(entry) if entry.settled => Debt::Settled,
+            Some(entry) if entry.settled => Debt::Settled { until: entry.until },
             Some(_) => Debt::Open,
             // A full table must not make a debt invisible.
             None if self.0.is_full() => Debt::Open,

@@ -66,23 +66,26 @@ impl<S: Read + ReadReady + Write> Link<S> {
         let State::Draining {
             until,
             mut heard,
-            mut babble_at,
+            mut noisy,
             mut thrown,
         } = self.state
         else {
             return None;
         };
-        let count = match self.hear_draining(now) {
-            Ok(count) => count,
+        let (count, late) = match self.hear_draining(now) {
+            Ok(counts) => counts,
             Err(fault) => {
                 self.length = 0;
                 return Some(Error::Port(self.fail_port(fault, now)));
             }
         };
         if count > 0 {
+            if now >= timing::after(heard, self.config.silence) {
+                (noisy, thrown) = (now, 0);
+            }
             heard = now;
             thrown = thrown.saturating_add(count);
-            self.counters.noise = self.counters.noise.wrapping_add(count);
+            self.counters.noise = self.counters.noise.wrapping_add(count).wrapping_sub(late);
         } else if now >= until && now >= timing::after(heard, self.config.silence) {
             if self.length > 0 {
                 self.trace.note(
@@ -96,7 +99,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
             return None;
         }
         let mut error = None;
-        if now >= babble_at {
+        if now >= timing::after(noisy, timing::babble(self.config.baud)) && heard == now {
             error = Some(Error::Noise(thrown));
             self.trace.note(
                 now,
@@ -104,20 +107,20 @@ impl<S: Read + ReadReady + Write> Link<S> {
                 self.received.get(..self.length).unwrap_or(&[]),
             );
             (self.length, thrown) = (0, 0);
-            babble_at = timing::after(now, timing::babble(self.config.baud));
+            noisy = now;
         }
         self.state = State::Draining {
             until,
             heard,
-            babble_at,
+            noisy,
             thrown,
         };
         error
     }
 
     /// Reads what is ready: the first bytes are kept, to recognise a late reply; returns how many
-    /// were read.
-    fn hear_draining(&mut self, now: Instant) -> Result<u32, PortFault> {
+    /// were read, and how many turned out to be a late reply.
+    fn hear_draining(&mut self, now: Instant) -> Result<(u32, u32), PortFault> {
         let before = self.length;
         self.receive()?;
         let mut count = self.length - before;
@@ -128,27 +131,27 @@ impl<S: Read + ReadReady + Write> Link<S> {
                 read => count += read,
             }
         }
-        self.recognise_late(now);
-        Ok(count as u32)
+        Ok((count as u32, self.recognise_late(now) as u32))
     }
 
-    /// Pays the debt whose reply lies at the front of the drained bytes.
-    fn recognise_late(&mut self, now: Instant) {
+    /// Pays the debt whose reply lies at the front of the drained bytes; returns its length, or 0.
+    fn recognise_late(&mut self, now: Instant) -> usize {
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
         let Some(owed) = self.owed.matching(bytes, None) else {
-            return;
+            return 0;
         };
         let Some(frame) = bytes.get(..owed.length) else {
-            return;
+            return 0;
         };
         if crate::rtu::Frame::new_checked(frame).is_err() {
-            return;
+            return 0;
         }
         self.trace.note(now, Event::Late, frame);
         self.counters.count(Error::Stale);
         self.owed.pay(owed);
         self.received.copy_within(owed.length..self.length, 0);
         self.length -= owed.length;
+        owed.length
     }
 
     /// Counts and traces `count` bytes at the end of what was received.

@@ -171,7 +171,13 @@ pub fn run_link(
         let outcome = link
             .poll(now)
             .map(|outcome| outcome.map(|response| frame_of(&response)));
-        (outcome, link.next_due())
+        // A free link has nothing due: it waits for its user.
+        let due = if link.is_free(now) {
+            at(u64::MAX)
+        } else {
+            link.next_due()
+        };
+        (outcome, due)
     })
 }
 
