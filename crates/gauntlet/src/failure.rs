@@ -72,6 +72,15 @@ impl<T, E: fmt::Display> OrFail<T> for Result<T, E> {
     }
 }
 
+/// A library's error whose text ends with the next step after its last semicolon, as theirs do.
+pub fn told(error: impl fmt::Display) -> anyhow::Error {
+    let text = error.to_string();
+    match text.rsplit_once("; ") {
+        Some((what, next)) => Failure::new(what, next).into(),
+        None => Failure::new(text, "").into(),
+    }
+}
+
 /// The lines for standard error, and the exit code.
 pub fn report(error: &anyhow::Error) -> (String, u8) {
     let failure = error.downcast_ref::<Failure>();

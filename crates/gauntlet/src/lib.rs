@@ -1,10 +1,35 @@
 //! The host tool: trains the map, runs the bridge on a PC, simulates the devices, shows and records what happens.
+//!
+//! | module | what it is for |
+//! |---|---|
+//! | [`cli`], [`commands`] | the command line and its verbs |
+//! | [`failure`], [`out`], [`tell`], [`progress`] | what a person reads |
+//! | [`port`], [`ports`], [`probe`] | serial ports: open, list, is anybody there |
+//! | [`platform`], [`slots`], [`session`] | the bridge on a PC: clock and wait, weights, thread and queues |
+//! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
+//! | [`record`], [`session_log`] | what a run hands over, and its log |
+//! | [`poses`], [`training`], [`quality`], [`model`] | hand motion, the map and its measures |
 
+pub mod cli;
+pub mod commands;
 pub mod failure;
 pub mod interrupt;
 pub mod live;
+pub mod model;
 pub mod out;
+pub mod platform;
 pub mod port;
 pub mod ports;
+pub mod poses;
+pub mod probe;
 pub mod progress;
+pub mod quality;
+pub mod record;
+pub mod run;
+pub mod session;
+pub mod session_log;
+pub mod slots;
 pub mod stats;
+pub mod tell;
+pub mod training;
+pub mod words;

@@ -14,6 +14,12 @@ pub fn note(text: Arguments<'_>) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
+/// A question to standard error, the cursor left behind it.
+pub fn ask(text: Arguments<'_>) {
+    let mut stderr = std::io::stderr().lock();
+    let _ = write!(stderr, "{text}").and_then(|()| stderr.flush());
+}
+
 /// One line to standard output.
 #[macro_export]
 macro_rules! say {
@@ -24,4 +30,14 @@ macro_rules! say {
 #[macro_export]
 macro_rules! note {
     ($($argument:tt)*) => { $crate::out::note(format_args!($($argument)*)) };
+}
+
+/// A result as JSON on standard output, indented.
+///
+/// # Errors
+/// A value that has no JSON form; none of this tool's.
+pub fn json(value: &impl serde::Serialize) -> anyhow::Result<()> {
+    let text = serde_json::to_string_pretty(value)?;
+    line(format_args!("{text}"));
+    Ok(())
 }

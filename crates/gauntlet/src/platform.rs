@@ -4,7 +4,7 @@ use std::os::fd::OwnedFd;
 use std::sync::Arc;
 use std::time::SystemTime;
 
-use bridge::Instant;
+use gripper::Instant;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::interrupt::Interrupt;
@@ -28,7 +28,13 @@ impl Clock {
 
     /// Now, in the bridge's time.
     pub fn now(&self) -> Instant {
-        Instant::from_ticks(self.start.elapsed().as_micros().try_into().unwrap_or(u64::MAX))
+        Instant::from_ticks(
+            self.start
+                .elapsed()
+                .as_micros()
+                .try_into()
+                .unwrap_or(u64::MAX),
+        )
     }
 
     /// The same instant as nanoseconds since 1970, for logs.
@@ -37,7 +43,7 @@ impl Clock {
             .start_wall
             .duration_since(SystemTime::UNIX_EPOCH)
             .map_or(0, |time| u64::try_from(time.as_nanos()).unwrap_or(0));
-        start.saturating_add(at.ticks().saturating_mul(1_000))
+        start.saturating_add(at.as_ticks().saturating_mul(1_000))
     }
 }
 
@@ -92,7 +98,10 @@ impl bridge::Platform for Pc {
 
     fn wait_until(&mut self, due: Instant) {
         let now = self.clock.now();
-        let Some(left) = due.checked_duration_since(now).filter(|left| left.ticks() > 0) else {
+        let Some(left) = due
+            .checked_duration_since(now)
+            .filter(|left| left.as_ticks() > 0)
+        else {
             return;
         };
         let asked = self.interrupt.asked();
@@ -104,7 +113,7 @@ impl bridge::Platform for Pc {
         if !asked {
             polled.push(PollFd::new(&self.interrupt, PollFlags::IN));
         }
-        let us = left.ticks();
+        let us = left.as_ticks();
         let timeout = Timespec {
             tv_sec: (us / 1_000_000).try_into().unwrap_or(i64::MAX),
             tv_nsec: (us % 1_000_000 * 1_000) as _,

@@ -28,6 +28,8 @@ pub enum Key {
     End,
     /// Space: close or open the clutch.
     Clutch,
+    /// `c`: the hand is flat now, calibrate on it.
+    Calibrate,
 }
 
 /// Where the view goes.
@@ -129,6 +131,7 @@ fn meaning(event: &Event) -> Option<Key> {
     match key.code {
         KeyCode::Char('q') | KeyCode::Esc => Some(Key::End),
         KeyCode::Char('c' | 'd') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Key::End),
+        KeyCode::Char('c') => Some(Key::Calibrate),
         KeyCode::Char(' ') => Some(Key::Clutch),
         _ => None,
     }

@@ -144,5 +144,9 @@ fn keys_mean_what_the_foot_line_says() {
         meaning(&key(KeyCode::Char('c'), KeyModifiers::CONTROL)),
         Some(Key::End)
     );
-    assert_eq!(meaning(&key(KeyCode::Char('c'), KeyModifiers::NONE)), None);
+    assert_eq!(
+        meaning(&key(KeyCode::Char('c'), KeyModifiers::NONE)),
+        Some(Key::Calibrate)
+    );
+    assert_eq!(meaning(&key(KeyCode::Char('x'), KeyModifiers::NONE)), None);
 }

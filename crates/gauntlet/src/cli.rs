@@ -1,0 +1,311 @@
+//! The command line: verbs, options, and the help a newcomer reads first.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Parser, Subcommand, ValueEnum};
+
+/// Operate a Robotiq 3-Finger gripper with a glove of 16 orientation sensors, or try it all without hardware.
+///
+/// Without a verb, `gauntlet` runs the demo: it trains a map from hand poses to gripper positions, starts a virtual
+/// glove and a virtual gripper that speak the real bytes, and drives one with the other for 20 seconds.
+#[derive(Debug, Parser)]
+#[command(
+    name = "gauntlet",
+    version,
+    after_help = "\
+Start here:
+  gauntlet                                       the demo: no hardware needed
+  gauntlet demo --poses my_hand.csv              the same with your own hand's recording
+
+With hardware:
+  gauntlet ports                                 which serial ports are there
+  gauntlet train --poses my_hand.csv --out model.safetensors
+  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
+
+`gauntlet help VERB` explains a verb and shows examples.
+Exit codes: 0 done, 1 failed, 2 wrong usage."
+)]
+pub struct Cli {
+    /// What to do; the demo if nothing is said.
+    #[command(subcommand)]
+    pub verb: Option<Verb>,
+}
+
+/// What the tool can do.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Train a map, then drive a virtual gripper with a virtual glove in real time.
+    Demo(Demo),
+    /// Learn the map from hand poses to gripper positions.
+    Train(Train),
+    /// Measure how good a trained map is on given poses.
+    Eval(Eval),
+    /// Make a virtual glove and a virtual gripper behind pseudo-terminals.
+    Simulate(Simulate),
+    /// Drive a gripper with a glove, through two serial ports.
+    Teleop(Teleop),
+    /// List the serial ports of this machine.
+    Ports(Ports),
+}
+
+/// Options of `demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet demo
+  gauntlet demo --poses my_hand.csv --log session.mcap
+  gauntlet demo --seconds 60 --json > result.json
+
+The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians
+(thumb_cmc_flex, thumb_cmc_abd, … little_dip_flex; docs/tool.md lists them).
+Keys while it runs on a terminal: space opens and closes the clutch, q holds the gripper and ends.")]
+pub struct Demo {
+    /// Train on and play this recording of a hand instead of generated motion.
+    #[arg(long, value_name = "FILE.csv")]
+    pub poses: Option<PathBuf>,
+    /// Write every frame, command and status into this session log.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub log: Option<PathBuf>,
+    /// How long to drive the gripper, in seconds (1 to 86400).
+    #[arg(long, value_name = "N", default_value = "20", value_parser = run_time)]
+    pub seconds: Duration,
+    /// Seed of everything random: the same seed trains the same map.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
+    #[arg(long)]
+    pub no_start_pairs: bool,
+    /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Default for Demo {
+    /// What `gauntlet` without a verb does.
+    fn default() -> Self {
+        Self {
+            poses: None,
+            log: None,
+            seconds: Duration::from_secs(20),
+            seed: 1,
+            no_start_pairs: false,
+            json: false,
+        }
+    }
+}
+
+/// How long to train.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Schedule {
+    /// The demo's: under a minute, a little less spread over the gripper's range.
+    Short,
+    /// The paper's 8,000 + 100 L epochs.
+    Paper,
+}
+
+/// Options of `train`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet train --poses my_hand.csv --out model.safetensors
+  gauntlet train --poses my_hand.csv --out model.safetensors --schedule paper --seed 7
+  gauntlet train --poses my_hand.csv --out model.safetensors --epochs 500 --json
+
+The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians
+(docs/tool.md lists them). A script answers for the person who would show the hand pose that
+belongs to a gripper pose. 60 % of the rows train, the rest measure the result.")]
+pub struct Train {
+    /// The hand poses to train on.
+    #[arg(long, value_name = "FILE.csv")]
+    pub poses: PathBuf,
+    /// Where the trained model goes.
+    #[arg(long, value_name = "MODEL.safetensors")]
+    pub out: PathBuf,
+    /// How long to train.
+    #[arg(long, value_enum, default_value_t = Schedule::Paper)]
+    pub schedule: Schedule,
+    /// Epochs of the last stage, instead of the schedule's (1 to 1000000).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub epochs: Option<u32>,
+    /// Reference pairs chosen one after another where they help most (1 to 100).
+    #[arg(long, value_name = "L", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100))]
+    pub pairs: u32,
+    /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
+    #[arg(long)]
+    pub no_start_pairs: bool,
+    /// Seed of everything random: the same seed trains the same map.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `eval`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet eval --model model.safetensors --poses other_recording.csv
+  gauntlet eval --model model.safetensors --poses my_hand.csv --json
+
+Mean distortion: how much the map stretches small motions unevenly; lower is smoother.
+Volume occupancy (VO): the share of the gripper's poses that the hand can reach, 0 to 1; 0.9 and more is good.
+d-Knn: how much farther apart neighbours come to lie; over about 16 the map folds somewhere.")]
+pub struct Eval {
+    /// The trained model.
+    #[arg(long, value_name = "MODEL.safetensors")]
+    pub model: PathBuf,
+    /// The hand poses to measure on; best ones the model was not trained on.
+    #[arg(long, value_name = "FILE.csv")]
+    pub poses: PathBuf,
+    /// Seed of the gripper poses that the map is compared with.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Print the result as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet simulate --glove /tmp/glove --gripper /tmp/gripper
+  gauntlet simulate --glove /tmp/glove --poses my_hand.csv
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors   (in another terminal)
+
+Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real
+ones at 115200 baud, and noise at any other speed. `ready` on a line of its own says that both answer.
+Runs until interrupted (Ctrl-C) and takes the links away.")]
+pub struct Simulate {
+    /// Link the virtual glove here.
+    #[arg(long, value_name = "PATH", required_unless_present = "gripper")]
+    pub glove: Option<PathBuf>,
+    /// Link the virtual gripper here.
+    #[arg(long, value_name = "PATH")]
+    pub gripper: Option<PathBuf>,
+    /// The glove plays this recording of a hand instead of generated motion.
+    #[arg(long, value_name = "FILE.csv", requires = "glove")]
+    pub poses: Option<PathBuf>,
+    /// Seed of the generated motion.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+/// Which hand wears the glove.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Hand {
+    /// The right hand.
+    Right,
+    /// The left hand.
+    Left,
+}
+
+/// Options of `teleop`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --engage --activate --seconds 10
+
+Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it,
+`--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or
+by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
+pub struct Teleop {
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT")]
+    pub glove: PathBuf,
+    /// The gripper's serial port.
+    #[arg(long, value_name = "PORT")]
+    pub gripper: PathBuf,
+    /// The trained model.
+    #[arg(long, value_name = "MODEL.safetensors")]
+    pub model: PathBuf,
+    /// End by itself after this many seconds (1 to 86400).
+    #[arg(long, value_name = "N", value_parser = run_time)]
+    pub seconds: Option<Duration>,
+    /// Close the clutch from the start: the gripper follows as soon as everything is ready.
+    #[arg(long)]
+    pub engage: bool,
+    /// Activate the gripper if it is not: the fingers move.
+    #[arg(long)]
+    pub activate: bool,
+    /// Which hand wears the glove.
+    #[arg(long, value_enum, default_value_t = Hand::Right)]
+    pub hand: Hand,
+    /// Take the hand's first pose as flat and fingers together, to calibrate the sensors' seats.
+    #[arg(long)]
+    pub calibrate_flat: bool,
+    /// Write every frame, command and status into this session log.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub log: Option<PathBuf>,
+    /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `ports`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet ports
+  gauntlet ports --json
+
+A warning says what will go wrong with a port before you use it, and the command that helps.")]
+pub struct Ports {
+    /// Print the list as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Whole or broken seconds from 1 to a day.
+fn run_time(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text
+        .parse()
+        .map_err(|_| format!("{text} is not a number of seconds"))?;
+    if (1.0..=86_400.0).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(format!("{text} is not between 1 and 86400 seconds"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_command_tree_is_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn every_verb_shows_examples() {
+        for verb in Cli::command().get_subcommands() {
+            let help = verb.get_after_help().map(ToString::to_string);
+            assert!(
+                help.is_some_and(|help| help.contains("Examples:")),
+                "{}",
+                verb.get_name()
+            );
+        }
+    }
+
+    #[test]
+    fn the_demo_without_a_verb_has_the_defaults_of_the_verb() {
+        let Some(Verb::Demo(typed)) = Cli::parse_from(["gauntlet", "demo"]).verb else {
+            panic!("demo is a verb");
+        };
+        assert_eq!(format!("{typed:?}"), format!("{:?}", Demo::default()));
+    }
+
+    #[test]
+    fn times_out_of_range_are_refused() {
+        for text in ["0", "-1", "nan", "inf", "1e9", "soon"] {
+            assert!(run_time(text).is_err(), "{text}");
+        }
+        assert_eq!(run_time("2.5"), Ok(Duration::from_millis(2500)));
+    }
+}

@@ -1,0 +1,232 @@
+//! `gauntlet demo`: the whole path, from a moving hand to a moving gripper, with nothing but this machine.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use gripper::Instant;
+use rig::Device;
+use rig::glove::VirtualGlove;
+use rig::gripper::VirtualGripper;
+use rig::pty::{Handle, PtyDevice};
+use serde_json::json;
+use trainer::algorithm::Schedule;
+
+use super::teleop;
+use crate::cli::Demo;
+use crate::failure::{Failure, OrFail};
+use crate::interrupt::Interrupt;
+use crate::platform::Clock;
+use crate::port::BAUD;
+use crate::poses::Motion;
+use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
+use crate::run::{End, Options, Run, Summary};
+use crate::session::{Parts, Session};
+use crate::session_log::{SessionLog, Written};
+use crate::stats::seconds;
+use crate::tell::Tell;
+use crate::training::{Outcome, Request, train};
+use crate::{model, out, probe};
+
+/// Reference pairs chosen one after another.
+const PAIRS: usize = 8;
+/// The virtual sensors boot in 650 ms and are brought up within a few seconds.
+const FRAME_WAIT: Duration = Duration::from_secs(15);
+
+/// Runs the demo.
+///
+/// # Errors
+/// A failure that says which of its steps did not succeed.
+pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
+    let clock = Clock::start();
+    let tell = Tell::new(options.json);
+    let motion = Motion::open_for_training(options.poses.as_deref(), options.seed)?;
+    let log = options
+        .log
+        .as_deref()
+        .map(|path| SessionLog::create(path, clock))
+        .transpose()?;
+    tell.say(format_args!(
+        "gauntlet demo: glove and gripper are virtual, everything between them is real"
+    ));
+    tell.say(format_args!("motion     {}", motion.describe()));
+    let outcome = trained(options, &motion, &tell, interrupt)?;
+    let image = model::image(&outcome.model)?;
+    let length = image.len();
+    let (devices, parts) = devices(&motion, image, &tell, interrupt)?;
+    let session = Session::start(parts, clock, interrupt)?;
+    tell.say(format_args!(
+        "weights    an image of {length} bytes is stored and checked in the bridge's weights store"
+    ));
+    let mut run = Run::new(session, log, clock, interrupt.clone());
+    let driven = drive(options, &mut run, &tell, interrupt);
+    let (summary, log) = run.finish()?;
+    drop(devices);
+    let end = driven?;
+    let finished = Finished {
+        outcome: &outcome,
+        summary: &summary,
+        log: log.as_ref(),
+        first_motion: summary.first_motion.map(Instant::from_ticks),
+        motion: &motion,
+    };
+    finished.tell(options, &tell)?;
+    match end {
+        End::Time => finished.judge(),
+        End::Asked => Ok(()),
+    }
+}
+
+fn trained(options: &Demo, motion: &Motion, tell: &Tell, interrupt: &Interrupt) -> Result<Outcome> {
+    let request = Request {
+        motion,
+        schedule: Schedule::Fast,
+        epochs: None,
+        pairs: PAIRS,
+        start_pairs: !options.no_start_pairs,
+        seed: options.seed,
+        quiet: false,
+    };
+    tell.say(format_args!(
+        "training   {} start pairs and {PAIRS} chosen where they help most, shown by the scripted operator;",
+        if options.no_start_pairs { "no" } else { "2 (open hand, fist)" }
+    ));
+    tell.say(format_args!(
+        "           short schedule of {} epochs (the paper's is 8,000 + 100 a pair: `gauntlet train`)",
+        request.total_epochs()
+    ));
+    let outcome = train(&request, interrupt)?;
+    tell.say(format_args!("trained    in {}", seconds(outcome.took)));
+    tell.say(format_args!("quality    {}", outcome.quality.line()));
+    require_good(&outcome.quality)?;
+    Ok(outcome)
+}
+
+/// The demo does not drive with a map that leaves out much of the gripper's range, or folds.
+fn require_good(quality: &Quality) -> Result<()> {
+    if quality.good() {
+        return Ok(());
+    }
+    Err(Failure::new(
+        format!(
+            "the map is not good enough to drive with: volume occupancy {:.3} (at least {LEAST_OCCUPANCY}), d-Knn {:.2} (at most {GREATEST_D_KNN})",
+            quality.volume_occupancy, quality.d_knn
+        ),
+        "another --seed, or a recording in which every finger moves over its whole range, alone and together",
+    )
+    .into())
+}
+
+/// Starts both devices and opens the ports to them.
+fn devices(
+    motion: &Motion,
+    image: Vec<u8>,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<([Handle; 2], Parts)> {
+    let glove = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
+    let glove = spawn("glove", Box::new(glove))?;
+    let gripper = VirtualGripper::new(rig::gripper::Config::default());
+    let gripper = spawn("gripper", Box::new(gripper))?;
+    tell.say(format_args!(
+        "devices    virtual glove on {}, virtual gripper on {}, {BAUD} baud",
+        glove.path().display(),
+        gripper.path().display()
+    ));
+    let (gripper_port, _) = probe::open_gripper(gripper.path(), interrupt)?;
+    let parts = Parts {
+        glove: probe::open_glove(glove.path(), interrupt)?,
+        gripper: gripper_port,
+        image,
+        config: bridge::Config::default(),
+    };
+    Ok(([glove, gripper], parts))
+}
+
+fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
+    PtyDevice::spawn(device, None).or_fail(
+        || format!("the virtual {name} gets no pseudo-terminal"),
+        "ending programs that hold many of them (`ls /dev/pts`)",
+    )
+}
+
+/// Brings everything up, activates, engages, runs.
+fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> Result<End> {
+    let framed = run.wait(FRAME_WAIT, |snapshot| snapshot.frame_sequence > 0)?;
+    if interrupt.asked() {
+        return Ok(End::Asked);
+    }
+    if !framed {
+        return Err(Failure::new(
+            format!(
+                "the virtual glove sent no frame in {} s",
+                FRAME_WAIT.as_secs()
+            ),
+            "the same on a machine with less to do",
+        )
+        .into());
+    }
+    if !teleop::activate(run, tell, interrupt)? {
+        return Ok(End::Asked);
+    }
+    tell.say(format_args!(
+        "engaged    the gripper follows the hand for {} (Ctrl-C holds it and ends)",
+        seconds(options.seconds)
+    ));
+    run.drive(&Options {
+        title: "gauntlet demo",
+        seconds: Some(options.seconds),
+        engage: true,
+        quiet: options.json,
+    })
+}
+
+/// All there is to say at the end.
+struct Finished<'a> {
+    outcome: &'a Outcome,
+    summary: &'a Summary,
+    log: Option<&'a Written>,
+    first_motion: Option<Instant>,
+    motion: &'a Motion,
+}
+
+impl Finished<'_> {
+    fn tell(&self, options: &Demo, tell: &Tell) -> Result<()> {
+        let first_motion = self.first_motion.map(|at| at.as_ticks() as f64 / 1e6);
+        if options.json {
+            return out::json(&json!({
+                "motion": self.motion.describe(),
+                "training_s": self.outcome.took.as_secs_f64(),
+                "epochs": self.outcome.epochs,
+                "pairs": self.outcome.pairs,
+                "quality": self.outcome.quality,
+                "first_motion_s": first_motion,
+                "run": self.summary,
+                "log": self.log.map(|log| &log.path),
+            }));
+        }
+        tell.say(format_args!("summary    the gripper is held where it is"));
+        for line in self.summary.lines() {
+            tell.say(format_args!("{line}"));
+        }
+        if let Some(first) = first_motion {
+            tell.say(format_args!(
+                "motion     the gripper first moved with the hand {first:.1} s after the start"
+            ));
+        }
+        tell.say(format_args!("map        {}", self.outcome.quality.line()));
+        tell.log(self.log);
+        Ok(())
+    }
+
+    /// A demo in which the gripper did not move has failed, whatever was printed.
+    fn judge(&self) -> Result<()> {
+        if self.first_motion.is_some() {
+            return Ok(());
+        }
+        Err(Failure::new(
+            "the gripper did not move with the hand",
+            "--log FILE.mcap, whose events say what held it",
+        )
+        .into())
+    }
+}

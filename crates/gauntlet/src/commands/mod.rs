@@ -1,0 +1,33 @@
+//! The verbs, one module each.
+
+mod demo;
+mod eval;
+mod ports;
+mod simulate;
+mod teleop;
+mod train;
+
+use anyhow::Result;
+
+use crate::cli::{Cli, Demo, Verb};
+use crate::failure::OrFail;
+use crate::interrupt::Interrupt;
+
+/// Runs what the command line says.
+///
+/// # Errors
+/// Whatever went wrong, mostly a [`crate::failure::Failure`] with the next step.
+pub fn run(cli: Cli) -> Result<()> {
+    let interrupt = Interrupt::install().or_fail(
+        || "Ctrl-C cannot be caught".to_owned(),
+        "ending other programs: the system lacks descriptors",
+    )?;
+    match cli.verb.unwrap_or_else(|| Verb::Demo(Demo::default())) {
+        Verb::Demo(options) => demo::run(&options, &interrupt),
+        Verb::Train(options) => train::run(&options, &interrupt),
+        Verb::Eval(options) => eval::run(&options),
+        Verb::Simulate(options) => simulate::run(&options, &interrupt),
+        Verb::Teleop(options) => teleop::run(&options, &interrupt),
+        Verb::Ports(options) => ports::run(&options),
+    }
+}

@@ -1,0 +1,235 @@
+//! `gauntlet teleop`: a gripper driven by a glove, over any two serial ports.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Result;
+use gripper::{Activation, Status};
+use serde_json::json;
+
+use crate::cli::{Hand, Teleop};
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::platform::Clock;
+use crate::record::AXES;
+use crate::run::{Options, Run};
+use crate::session::{Order, Parts, Session};
+use crate::session_log::SessionLog;
+use crate::tell::Tell;
+use crate::{model, out, ports, probe, words};
+
+/// Bring-up of 16 sensors: a reset of 650 ms, two mode changes each, and time to spare.
+const FRAME_WAIT: Duration = Duration::from_secs(15);
+/// An activation takes a few seconds; a gripper that needs longer has a fault.
+pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
+/// For a calibration on the first good frame.
+const CALIBRATION_WAIT: Duration = Duration::from_secs(3);
+
+/// Runs until its time is over or somebody ends it.
+///
+/// # Errors
+/// A failure that names the file, the port or the device.
+pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(options.json);
+    check_ports(options)?;
+    let image = model::image(&model::load(&options.model)?)?;
+    let config = config(options.hand)?;
+    for path in [&options.glove, &options.gripper] {
+        if let Some(warning) = ports::latency_warning(path) {
+            tell.say(format_args!("warning: {}: {warning}", path.display()));
+        }
+    }
+    let (gripper, status) = probe::open_gripper(&options.gripper, interrupt)?;
+    tell.say(format_args!(
+        "gripper  {}  answers, {}",
+        options.gripper.display(),
+        words::activation(status.activation)
+    ));
+    let glove = probe::open_glove(&options.glove, interrupt)?;
+    let clock = Clock::start();
+    let log = options
+        .log
+        .as_deref()
+        .map(|path| SessionLog::create(path, clock))
+        .transpose()?;
+    let parts = Parts {
+        glove,
+        gripper,
+        image,
+        config,
+    };
+    let session = Session::start(parts, clock, interrupt)?;
+    let mut run = Run::new(session, log, clock, interrupt.clone());
+    let result = prepare(options, &mut run, &tell, interrupt, status).and_then(|go_on| {
+        if go_on {
+            drive(options, &mut run)?;
+        }
+        Ok(())
+    });
+    let (summary, log) = run.finish()?;
+    result?;
+    tell.say(format_args!("the gripper is held where it is"));
+    if options.json {
+        return out::json(&json!({ "run": summary, "log": log.map(|log| log.path) }));
+    }
+    summary
+        .lines()
+        .iter()
+        .for_each(|line| tell.say(format_args!("{line}")));
+    tell.log(log.as_ref());
+    Ok(())
+}
+
+fn check_ports(options: &Teleop) -> Result<()> {
+    let same = |a: &Path, b: &Path| {
+        a == b || std::fs::canonicalize(a).ok() == std::fs::canonicalize(b).ok()
+    };
+    if options.glove.exists() && same(&options.glove, &options.gripper) {
+        return Err(Failure::usage(
+            format!(
+                "glove and gripper are on the same port, {}",
+                options.glove.display()
+            ),
+            "`gauntlet ports` to tell them apart",
+        )
+        .into());
+    }
+    Ok(())
+}
+
+fn config(hand: Hand) -> Result<bridge::Config<AXES>> {
+    use glove::hand::Side;
+    let settings = bridge::Settings {
+        side: match hand {
+            Hand::Right => Side::Right,
+            Hand::Left => Side::Left,
+        },
+        ..bridge::Settings::default()
+    };
+    bridge::Config::new(settings).map_err(crate::failure::told)
+}
+
+/// Everything before the clutch may close. Returns whether to go on.
+fn prepare(
+    options: &Teleop,
+    run: &mut Run,
+    tell: &Tell,
+    interrupt: &Interrupt,
+    status: Status<AXES>,
+) -> Result<bool> {
+    tell.say(format_args!(
+        "glove    {}  answers, bringing up its 16 sensors",
+        options.glove.display()
+    ));
+    let framed = run.wait(FRAME_WAIT, |s| s.frame_sequence > 0)?;
+    if interrupt.asked() {
+        return Ok(false);
+    }
+    if !framed {
+        return Err(no_frames(&options.glove));
+    }
+    if options.calibrate_flat && !calibrate(run, tell)? {
+        return Ok(false);
+    }
+    if status.activation == Activation::Ready {
+        return Ok(true);
+    }
+    if options.activate
+        || run.ask_yes(
+            "The gripper is not activated. Activation moves its fingers. Type yes to activate it: ",
+        )?
+    {
+        return activate(run, tell, interrupt);
+    }
+    if interrupt.asked() {
+        return Ok(false);
+    }
+    if options.engage {
+        return Err(Failure::new(
+            format!(
+                "the gripper on {} is {}, so it cannot follow",
+                options.gripper.display(),
+                words::activation(status.activation)
+            ),
+            "the same with --activate: the fingers will move",
+        )
+        .into());
+    }
+    tell.say(format_args!(
+        "not activated: you can watch the hand, the gripper will not move"
+    ));
+    Ok(true)
+}
+
+/// Takes the hand as flat, now.
+fn calibrate(run: &mut Run, tell: &Tell) -> Result<bool> {
+    let calibrations = run.calibrations();
+    run.order(Order::Calibrate);
+    let end = std::time::Instant::now() + CALIBRATION_WAIT;
+    while std::time::Instant::now() < end {
+        run.wait(Duration::from_millis(50), |_| false)?;
+        if run.calibrations() > calibrations {
+            tell.say(format_args!("calibrated on the flat hand"));
+            return Ok(true);
+        }
+    }
+    Err(Failure::new(
+        "no complete frame came for the calibration",
+        "all 16 sensors plugged in, the hand flat and still",
+    )
+    .into())
+}
+
+/// Activates the gripper and waits until it is ready. Returns whether to go on.
+pub(super) fn activate(run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> Result<bool> {
+    tell.say(format_args!("activating the gripper: its fingers move"));
+    run.order(Order::Activate);
+    let ready = run.wait(ACTIVATION_WAIT, |s| {
+        s.status
+            .is_some_and(|status| status.activation == Activation::Ready)
+    })?;
+    if !ready && !interrupt.asked() {
+        let fault = run
+            .session()
+            .snapshot()
+            .and_then(|snapshot| snapshot.status)
+            .map_or_else(String::new, |status| {
+                format!(
+                    " (fault {:02X}: {})",
+                    status.fault.code(),
+                    status.fault.sentence()
+                )
+            });
+        return Err(Failure::new(
+            format!(
+                "the gripper was not ready {} s after its activation was asked for{fault}",
+                ACTIVATION_WAIT.as_secs()
+            ),
+            "take what blocks its fingers away, switch its 24 V supply off and on, and start again",
+        )
+        .into());
+    }
+    Ok(ready)
+}
+
+fn no_frames(path: &Path) -> anyhow::Error {
+    Failure::new(
+        format!(
+            "the glove's serial multiplexer on {} answers, but no sensor sent an orientation in {} s",
+            path.display(),
+            FRAME_WAIT.as_secs()
+        ),
+        "the cables between multiplexer and sensors, and their power",
+    )
+    .into()
+}
+
+fn drive(options: &Teleop, run: &mut Run) -> Result<()> {
+    run.drive(&Options {
+        title: "gauntlet teleop",
+        seconds: options.seconds,
+        engage: options.engage,
+        quiet: options.json,
+    })?;
+    Ok(())
+}

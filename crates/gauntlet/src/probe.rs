@@ -1,0 +1,133 @@
+//! Does anybody answer on this port? Asked of each device in its own language, without moving or changing anything.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use embedded_io::{Read, ReadReady, Write};
+use gripper::driver::ThreeFinger;
+use gripper::{Gripper, Status};
+
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::platform::Clock;
+use crate::port::{BAUD, Port};
+use crate::record::AXES;
+
+/// The SC18IM's speed after a reset.
+const RESET_BAUD: u32 = 9_600;
+/// Read the register I2CStat (0A): `R 0A P`. Answered by one byte, F0 to F8, whatever hangs on the bus.
+const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
+/// Write BRG0 = 30, BRG1 = 00: 7372800 / 115200 − 16 = 0x0030. Works as soon as BRG1 is there.
+const SET_BAUD: [u8; 6] = [0x57, 0x00, 0x30, 0x01, 0x00, 0x50];
+/// Three bytes out and one back take 4.2 ms at 9600 baud; an adapter may keep them back for 16 ms twice.
+const ANSWER_WAIT: Duration = Duration::from_millis(60);
+/// A command cut off by whoever used the port before is forgotten after this (the chip's idle timeout is 655 ms).
+const IDLE: Duration = Duration::from_millis(700);
+/// For the new speed to be in effect.
+const SPEED_WAIT: Duration = Duration::from_millis(5);
+/// Time a gripper gets to answer a status read: some fifty cycles.
+const GRIPPER_WAIT: Duration = Duration::from_secs(1);
+/// Pause between two looks at a port.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// Opens the glove's port and finds its serial multiplexer, at 115200 baud or, fresh from power-on, at 9600, from where
+/// it is switched to 115200.
+///
+/// # Errors
+/// A failure that says whether the port does not open or nobody answers on it, and what to try.
+pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Port> {
+    let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+    if answers(&mut port, interrupt) {
+        return Ok(port);
+    }
+    drop(port);
+    let mut slow = Port::open(path, RESET_BAUD).map_err(Failure::from)?;
+    if status_byte(&mut slow, interrupt) && slow.write(&SET_BAUD) == Ok(SET_BAUD.len()) {
+        // All six bytes must have left at the old speed: 6.3 ms.
+        interrupt.sleep(2 * SPEED_WAIT);
+        drop(slow);
+        let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+        interrupt.sleep(SPEED_WAIT);
+        if answers(&mut port, interrupt) {
+            return Ok(port);
+        }
+    }
+    Err(Failure::new(
+        format!(
+            "no glove answers on {}: asked its serial multiplexer (SC18IM) at {BAUD} and {RESET_BAUD} baud",
+            path.display()
+        ),
+        "the glove's power, TX against RX, whether this is the gripper's port (`gauntlet ports`); \
+         then unplug the glove and plug it in again",
+    )
+    .into())
+}
+
+/// Twice at once, and once more after the time in which a cut-off command is forgotten.
+fn answers(port: &mut Port, interrupt: &Interrupt) -> bool {
+    if status_byte(port, interrupt) || status_byte(port, interrupt) {
+        return true;
+    }
+    !interrupt.sleep(IDLE) && status_byte(port, interrupt)
+}
+
+fn status_byte(port: &mut Port, interrupt: &Interrupt) -> bool {
+    discard(port);
+    if port.write(&READ_STATUS) != Ok(READ_STATUS.len()) {
+        return false;
+    }
+    let end = Instant::now() + ANSWER_WAIT;
+    while Instant::now() < end && !interrupt.sleep(LOOK) {
+        let mut byte = [0];
+        if port.read_ready() == Ok(true) && port.read(&mut byte) == Ok(1) {
+            // More than one byte is noise or somebody else's chatter.
+            interrupt.sleep(2 * LOOK);
+            return (0xF0..=0xF8).contains(&byte[0]) && port.read_ready() == Ok(false);
+        }
+    }
+    false
+}
+
+/// Throws away what is there, 4 kB at most.
+fn discard(port: &mut Port) {
+    for _ in 0..64 {
+        if port.read_ready() != Ok(true) || port.read(&mut [0; 64]).is_err() {
+            return;
+        }
+    }
+}
+
+/// Opens the gripper's port and reads its status.
+///
+/// # Errors
+/// A failure that says whether the port does not open or nobody answers on it, and what to try.
+pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Port, Status<AXES>)> {
+    let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+    let config = gripper::driver::Config::default();
+    let unit = config.unit;
+    let clock = Clock::start();
+    let end = Instant::now() + GRIPPER_WAIT;
+    let mut driver = ThreeFinger::new(&mut port, config);
+    let mut last_error = None;
+    while Instant::now() < end && !interrupt.sleep(LOOK) {
+        match driver.poll(clock.now()) {
+            Some(Ok(status)) => {
+                drop(driver);
+                return Ok((port, status));
+            }
+            Some(Err(error)) => last_error = Some(error),
+            None => {}
+        }
+    }
+    let why = last_error.map_or_else(String::new, |error| format!(" ({error})"));
+    Err(Failure::new(
+        format!(
+            "no gripper answers on {}: read the status of unit {unit} at {BAUD} baud{why}",
+            path.display()
+        ),
+        "the gripper's 24 V supply, RS-485 A against B, whether this is the glove's port (`gauntlet ports`), \
+         and baud and slave id in the vendor's tool",
+    )
+    .into())
+}

@@ -1,0 +1,96 @@
+//! What a run hands to whoever watches it: frames, commands, statuses and events, each exactly once.
+
+use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
+use gripper::Instant;
+use gripper::{Motion, Status};
+
+/// Axes of the gripper the tool drives: the 3-Finger's fingers A, B, C and the scissor.
+pub const AXES: usize = 4;
+
+/// One sensor's part of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Imu {
+    /// w, x, y, z.
+    pub quaternion: [f32; 4],
+    /// When it was read.
+    pub stamp: Instant,
+    /// What was found at the sensor, in a word.
+    pub health: &'static str,
+    /// Whether the sample is fresh and usable.
+    pub good: bool,
+}
+
+/// One frame of the glove and what the bridge made of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Frame {
+    /// When the bridge took it.
+    pub at: Instant,
+    /// The scanner's number of it; wraps.
+    pub sequence: u32,
+    /// The sensors in the order of `glove::hand::SEGMENT_NAMES`.
+    pub imus: [Imu; SEGMENT_COUNT],
+    /// Joint angles, radians.
+    pub angles: [f32; JOINT_COUNT],
+    /// Whether they are usable.
+    pub angles_valid: bool,
+    /// What the map makes of them, counts; `None` where it was not asked.
+    pub map_output: Option<[f32; AXES]>,
+    /// Whether a command followed in the same step; `None` while the gripper does not follow the hand.
+    pub answered: Option<bool>,
+}
+
+/// One command that left for the gripper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Command {
+    /// When it was handed to the port.
+    pub at: Instant,
+    /// Positions, speeds, forces.
+    pub motion: Motion<AXES>,
+    /// Age of the oldest sample it rests on, µs; `None` for a hold, which rests on none.
+    pub age_us: Option<u64>,
+    /// Whether it is the first one that rests on that sample: its age is the latency of that frame.
+    pub first: bool,
+}
+
+/// Sorts of events that somebody acts on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Sort {
+    /// Something happened.
+    Note,
+    /// Something is wrong.
+    Fault,
+    /// A flat hand was taken as calibration.
+    Calibrated,
+}
+
+/// One thing to hand over.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Record {
+    /// A frame.
+    Frame(Box<Frame>),
+    /// A command.
+    Command(Command),
+    /// A status of the gripper.
+    Status(Status<AXES>),
+    /// Something that happened, in words.
+    Event {
+        /// When.
+        at: Instant,
+        /// Which sort of thing.
+        sort: Sort,
+        /// What.
+        text: String,
+    },
+}
+
+impl Record {
+    /// When it happened.
+    pub fn at(&self) -> Instant {
+        match self {
+            Self::Frame(frame) => frame.at,
+            Self::Command(command) => command.at,
+            Self::Status(status) => status.stamp,
+            Self::Event { at, .. } => *at,
+        }
+    }
+}

@@ -1,0 +1,302 @@
+//! What is counted during a run, and its sum.
+
+use gripper::Instant;
+use serde::Serialize;
+
+use crate::record::{AXES, Record, Sort};
+use crate::stats::{Percentiles, Rate, short_or_dash};
+
+/// Counts an axis must have gone before that is called a motion: more than noise of the measured position.
+const MOVED_COUNTS: u8 = 4;
+
+/// Counters of a run, in bounded memory.
+#[derive(Debug, Default)]
+pub struct Numbers {
+    /// Frames of the glove.
+    pub frames: Rate,
+    /// Statuses of the gripper.
+    pub cycles: Rate,
+    /// From the oldest sample to the command.
+    pub latency: Percentiles,
+    commands: u64,
+    frames_following: u64,
+    frames_answered: u64,
+    sequence_gaps: u64,
+    last_sequence: Option<u32>,
+    faults: u64,
+    following: bool,
+    /// Positions when following began.
+    start_positions: Option<[u8; AXES]>,
+    first_motion: Option<Instant>,
+    last_fault: Option<String>,
+}
+
+impl Numbers {
+    /// Forgets what was counted while things were brought up; the run begins.
+    pub fn begin(&mut self) {
+        *self = Self {
+            last_sequence: self.last_sequence,
+            ..Self::default()
+        };
+    }
+
+    /// Counts one record in.
+    pub fn count(&mut self, record: &Record) {
+        match record {
+            Record::Frame(frame) => {
+                self.frames.add(frame.at.as_ticks());
+                if let Some(last) = self.last_sequence.replace(frame.sequence) {
+                    self.sequence_gaps +=
+                        u64::from(frame.sequence.wrapping_sub(last).saturating_sub(1));
+                }
+                self.following = frame.answered.is_some();
+                self.frames_following += u64::from(frame.answered.is_some());
+                self.frames_answered += u64::from(frame.answered == Some(true));
+            }
+            Record::Command(command) => {
+                self.commands += 1;
+                if let Some(us) = command.age_us.filter(|_| command.first) {
+                    self.latency.add(us);
+                }
+            }
+            Record::Status(status) => {
+                self.cycles.add(status.stamp.as_ticks());
+                self.look_for_motion(status.stamp, status.position);
+            }
+            Record::Event { sort, text, .. } => {
+                if *sort == Sort::Fault {
+                    self.faults += 1;
+                    self.last_fault = Some(text.clone());
+                }
+            }
+        }
+    }
+
+    fn look_for_motion(&mut self, at: Instant, position: [u8; AXES]) {
+        if !self.following || self.first_motion.is_some() {
+            return;
+        }
+        let start = *self.start_positions.get_or_insert(position);
+        let moved = start
+            .iter()
+            .zip(position)
+            .any(|(start, now)| start.abs_diff(now) >= MOVED_COUNTS);
+        if moved {
+            self.first_motion = Some(at);
+        }
+    }
+
+    /// Frames that no command answered while following, and frames that never arrived here.
+    pub fn dropped(&self) -> u64 {
+        self.frames_following - self.frames_answered + self.sequence_gaps
+    }
+
+    /// Faults so far.
+    pub fn faults(&self) -> u64 {
+        self.faults
+    }
+
+    /// When the gripper first moved with the hand.
+    pub fn first_motion(&self) -> Option<Instant> {
+        self.first_motion
+    }
+
+    /// The sum of the run.
+    pub fn summary(&self, counters: Option<bridge::telemetry::Counters>) -> Summary {
+        Summary {
+            glove_frames: self.frames.count(),
+            glove_frames_per_s: rounded(self.frames.mean()),
+            frames_following: self.frames_following,
+            frames_answered: self.frames_answered,
+            frames_dropped: self.dropped(),
+            gripper_cycles: self.cycles.count(),
+            gripper_cycles_per_s: rounded(self.cycles.mean()),
+            commands: self.commands,
+            latency_p50_us: self.latency.at(0.5),
+            latency_p99_us: self.latency.at(0.99),
+            latency_max_us: self.latency.longest(),
+            faults: self.faults,
+            last_fault: self.last_fault.clone(),
+            late_steps: counters.map_or(0, |c| c.late_steps),
+            worst_late_us: counters.map_or(0, |c| c.worst_late_us),
+            gripper_errors: counters.map_or(0, |c| c.gripper_errors),
+            holds: counters.map_or(0, |c| c.holds),
+            first_motion: self.first_motion.map(|at| at.as_ticks()),
+        }
+    }
+}
+
+fn rounded(rate: f64) -> f64 {
+    (rate * 100.0).round() / 100.0
+}
+
+/// The numbers of a finished run.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Summary {
+    /// Frames of the glove.
+    pub glove_frames: u64,
+    /// Frames a second, over the whole run.
+    pub glove_frames_per_s: f64,
+    /// Frames that came while the gripper followed.
+    pub frames_following: u64,
+    /// Those of them that a command answered.
+    pub frames_answered: u64,
+    /// Frames lost on the way, and frames that no command answered while following.
+    pub frames_dropped: u64,
+    /// Statuses of the gripper.
+    pub gripper_cycles: u64,
+    /// Statuses a second, over the whole run.
+    pub gripper_cycles_per_s: f64,
+    /// Commands decided, holds included.
+    pub commands: u64,
+    /// From the oldest sample used to the command, µs: half of all were faster.
+    pub latency_p50_us: Option<u64>,
+    /// The same for 99 of 100.
+    pub latency_p99_us: Option<u64>,
+    /// The slowest.
+    pub latency_max_us: Option<u64>,
+    /// Faults.
+    pub faults: u64,
+    /// The last of them.
+    pub last_fault: Option<String>,
+    /// Steps of the supervisor that came more than 2 ms late.
+    pub late_steps: u32,
+    /// The latest of them, µs.
+    pub worst_late_us: u32,
+    /// Cycles of the gripper that ended in an error.
+    pub gripper_errors: u32,
+    /// How often motion was held.
+    pub holds: u32,
+    /// When the gripper first moved with the hand, µs since the tool started.
+    #[serde(skip)]
+    pub first_motion: Option<u64>,
+}
+
+impl Summary {
+    /// The lines a person reads.
+    pub fn lines(&self) -> Vec<String> {
+        let mut lines = vec![
+            format!(
+                "rates      glove {:.1} scans/s ({}), gripper {:.1} cycles/s ({})",
+                self.glove_frames_per_s,
+                self.glove_frames,
+                self.gripper_cycles_per_s,
+                self.gripper_cycles
+            ),
+            format!(
+                "answered   {} of {} glove frames got a gripper command; dropped frames {}",
+                self.frames_answered, self.frames_following, self.frames_dropped
+            ),
+            format!(
+                "latency    oldest sample to command: p50 {}, p99 {}, longest {}",
+                short_or_dash(self.latency_p50_us),
+                short_or_dash(self.latency_p99_us),
+                short_or_dash(self.latency_max_us)
+            ),
+            format!(
+                "faults     {}{}; gripper line errors {}, late steps {} (worst {})",
+                self.faults,
+                self.last_fault
+                    .as_ref()
+                    .map_or_else(String::new, |fault| format!(" (last: {fault})")),
+                self.gripper_errors,
+                self.late_steps,
+                short_or_dash(Some(self.worst_late_us.into()))
+            ),
+        ];
+        if self.holds > 0 {
+            lines.push(format!("holds      motion was held {} times", self.holds));
+        }
+        lines
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{Command, Frame, Imu};
+    use gripper::{Activation, Contact, Fault, Motion, Status};
+
+    fn at(us: u64) -> Instant {
+        Instant::from_ticks(us)
+    }
+
+    fn frame(us: u64, sequence: u32, answered: Option<bool>) -> Record {
+        let imu = Imu {
+            quaternion: [1.0, 0.0, 0.0, 0.0],
+            stamp: at(us),
+            health: "good",
+            good: true,
+        };
+        Record::Frame(Box::new(Frame {
+            at: at(us),
+            sequence,
+            imus: [imu; glove::hand::SEGMENT_COUNT],
+            angles: [0.0; glove::hand::JOINT_COUNT],
+            angles_valid: true,
+            map_output: None,
+            answered,
+        }))
+    }
+
+    fn status(us: u64, position: u8) -> Record {
+        Record::Status(Status {
+            stamp: at(us),
+            activation: Activation::Ready,
+            going_to: true,
+            contact: [Contact::Moving; AXES],
+            echo: [0; AXES],
+            position: [position; AXES],
+            current: [0; AXES],
+            fault: Fault::None,
+        })
+    }
+
+    #[test]
+    fn unanswered_and_missing_frames_are_dropped_ones() {
+        let mut numbers = Numbers::default();
+        numbers.count(&frame(0, u32::MAX, None));
+        numbers.count(&frame(40_000, 0, Some(true)));
+        numbers.count(&frame(80_000, 1, Some(false)));
+        numbers.count(&frame(160_000, 3, Some(true)));
+        assert_eq!(numbers.dropped(), 2);
+        let summary = numbers.summary(None);
+        assert_eq!((summary.frames_following, summary.frames_answered), (3, 2));
+    }
+
+    #[test]
+    fn motion_counts_only_while_following_the_hand() {
+        let mut numbers = Numbers::default();
+        numbers.count(&status(1, 6));
+        numbers.count(&status(2, 100));
+        assert_eq!(numbers.first_motion(), None);
+        numbers.count(&frame(3, 0, Some(true)));
+        numbers.count(&status(4, 100));
+        numbers.count(&status(5, 103));
+        assert_eq!(numbers.first_motion(), None);
+        numbers.count(&status(6, 104));
+        assert_eq!(numbers.first_motion(), Some(at(6)));
+    }
+
+    #[test]
+    fn only_the_first_command_on_a_frame_is_its_latency() {
+        let mut numbers = Numbers::default();
+        let motion = Motion {
+            position: [0; AXES],
+            speed: [0; AXES],
+            force: [0; AXES],
+        };
+        for (age_us, first) in [(None, false), (Some(31_000), true), (Some(39_000), false)] {
+            numbers.count(&Record::Command(Command {
+                at: at(0),
+                motion,
+                age_us,
+                first,
+            }));
+        }
+        assert_eq!(
+            (numbers.latency.count(), numbers.latency.at(0.5)),
+            (1, Some(31_000))
+        );
+    }
+}

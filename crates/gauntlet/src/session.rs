@@ -1,0 +1,388 @@
+//! The bridge on a thread of its own: [`bridge::App`] over two serial ports, driven by orders, watched through records.
+//!
+//! Both ways go through bounded queues, and neither side ever waits for the other. Orders that do not fit are refused
+//! (the caller tries again with its next heartbeat); records that do not fit are counted. The thread ends in an orderly
+//! way: the clutch is opened, the bridge sends the hold, and only then is the gripper's port closed.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+use anyhow::Result;
+use bridge::event::Kind;
+use bridge::telemetry::Sent;
+use bridge::{App, HoldReason, State, Telemetry, WeightsStore};
+use glove::scan::{self, Scanner};
+use gripper::driver::ThreeFinger;
+use gripper::{Duration, Instant};
+
+use crate::failure::{Failure, OrFail};
+use crate::interrupt::Interrupt;
+use crate::platform::{Clock, Pc};
+use crate::port::{BAUD, Port, Watch};
+use crate::record::{AXES, Command, Frame, Imu, Record, Sort};
+use crate::slots::MemorySlot;
+use crate::words;
+
+/// The bridge as a PC runs it.
+pub type PcApp = App<Pc, Port, ThreeFinger<Port>, MemorySlot, AXES>;
+
+/// Orders that may wait; the loop takes them every 10 ms.
+const ORDERS: usize = 64;
+/// Records that may wait: about 10 s of a run.
+const RECORDS: usize = 4096;
+/// The hold must have gone out this long after the clutch opened; then the thread ends whatever the gripper does.
+const HOLD_WAIT: Duration = Duration::from_ticks(500_000);
+/// Cycles of the gripper after the clutch opened that prove that the hold arrived.
+const HOLD_CYCLES: u32 = 3;
+
+/// What the bridge can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// The clutch's heartbeat: send one every 100 ms to keep it closed.
+    Engage,
+    /// Open the clutch: hold.
+    Release,
+    /// Activate the gripper: the fingers move.
+    Activate,
+    /// Take the next good frame as the flat hand.
+    Calibrate,
+    /// Hold, and end.
+    Stop,
+}
+
+/// The state of everything at one moment.
+pub type Snapshot = Telemetry<AXES>;
+
+/// What a session is made of.
+#[derive(Debug)]
+pub struct Parts {
+    /// The glove's port.
+    pub glove: Port,
+    /// The gripper's port.
+    pub gripper: Port,
+    /// The weights image.
+    pub image: Vec<u8>,
+    /// The bridge's configuration.
+    pub config: bridge::Config<AXES>,
+}
+
+/// A running bridge.
+#[derive(Debug)]
+pub struct Session {
+    thread: Option<JoinHandle<Result<()>>>,
+    orders: SyncSender<Order>,
+    records: Receiver<Record>,
+    snapshot: Arc<Mutex<Option<Snapshot>>>,
+    lost: Arc<AtomicU64>,
+    ports: [Watch; 2],
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+impl Session {
+    /// Starts the bridge. Nothing moves: the clutch is open, and the gripper is only read.
+    ///
+    /// # Errors
+    /// A failure where the image is refused or the system gives no thread.
+    pub fn start(parts: Parts, clock: Clock, interrupt: &Interrupt) -> Result<Self> {
+        let (orders, order_queue) = sync_channel(ORDERS);
+        let (record_queue, records) = sync_channel(RECORDS);
+        let snapshot = Arc::new(Mutex::new(None));
+        let lost = Arc::new(AtomicU64::new(0));
+        let ports = [parts.glove.watch(), parts.gripper.watch()];
+        let platform = Pc::new(clock, ports.clone(), interrupt.clone());
+        let mut store = WeightsStore::new(
+            [MemorySlot::new(), MemorySlot::new()],
+            bridge::app::expected(AXES),
+        );
+        load(&mut store, &parts.image)?;
+        let worker = Worker {
+            orders: order_queue,
+            records: record_queue,
+            snapshot: Arc::clone(&snapshot),
+            lost: Arc::clone(&lost),
+            seen: Seen::default(),
+            ending: None,
+        };
+        let thread = std::thread::Builder::new()
+            .name("bridge".to_owned())
+            .spawn(move || {
+                let scanner = Scanner::new(
+                    parts.glove,
+                    scan::Config {
+                        baud: BAUD,
+                        ..scan::Config::default()
+                    },
+                );
+                let gripper = ThreeFinger::new(parts.gripper, gripper::driver::Config::default());
+                let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
+                worker.run(&mut app);
+                Ok(())
+            })
+            .or_fail(
+                || "the bridge cannot start".to_owned(),
+                "ending other programs",
+            )?;
+        Ok(Self {
+            thread: Some(thread),
+            orders,
+            records,
+            snapshot,
+            lost,
+            ports,
+        })
+    }
+
+    /// Tells the bridge something. Returns whether it was taken: not when the queue is full or the bridge has ended.
+    pub fn order(&self, order: Order) -> bool {
+        self.orders.try_send(order).is_ok()
+    }
+
+    /// What happened since the last call, in order. Never waits.
+    pub fn records(&self) -> impl Iterator<Item = Record> + '_ {
+        self.records.try_iter()
+    }
+
+    /// The state now; `None` before the first step.
+    pub fn snapshot(&self) -> Option<Snapshot> {
+        *lock(&self.snapshot)
+    }
+
+    /// Records that did not fit their queue.
+    pub fn lost(&self) -> u64 {
+        self.lost.load(Ordering::Relaxed)
+    }
+
+    /// The glove's and the gripper's port.
+    pub fn ports(&self) -> &[Watch; 2] {
+        &self.ports
+    }
+
+    /// Whether the bridge's thread still runs.
+    pub fn running(&self) -> bool {
+        self.thread
+            .as_ref()
+            .is_some_and(|thread| !thread.is_finished())
+    }
+
+    /// Holds the gripper where it is and ends the bridge, within half a second.
+    ///
+    /// # Errors
+    /// What ended the bridge before.
+    pub fn stop(&mut self) -> Result<()> {
+        // A full queue is drained by the loop within 10 ms; the bound is for a loop that has ended.
+        for _ in 0..100 {
+            if self.order(Order::Stop) || !self.running() {
+                break;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        match self.thread.take().map(JoinHandle::join) {
+            None => Ok(()),
+            Some(Ok(result)) => result,
+            Some(Err(_)) => Err(Failure::new(
+                "the bridge stopped on a fault of its own",
+                "the same again with --log, and report what it says",
+            )
+            .into()),
+        }
+    }
+}
+
+impl Drop for Session {
+    fn drop(&mut self) {
+        let _ = self.stop();
+    }
+}
+
+/// Puts the image into the store the way it comes over a line: begun, in chunks, committed last.
+fn load(store: &mut WeightsStore<MemorySlot>, image: &[u8]) -> Result<()> {
+    let refused = || "the weights image was refused".to_owned();
+    let next = "training the model again";
+    store.begin(image.len()).or_fail(refused, next)?;
+    for (index, chunk) in image.chunks(bridge::store::PAGE).enumerate() {
+        store
+            .chunk(index * bridge::store::PAGE, chunk)
+            .or_fail(refused, next)?;
+    }
+    store.commit().or_fail(refused, next)
+}
+
+/// The thread's side of the queues.
+struct Worker {
+    orders: Receiver<Order>,
+    records: SyncSender<Record>,
+    snapshot: Arc<Mutex<Option<Snapshot>>>,
+    lost: Arc<AtomicU64>,
+    seen: Seen,
+    ending: Option<Ending>,
+}
+
+/// When the hold was ordered, and what the gripper had answered by then.
+#[derive(Clone, Copy)]
+struct Ending {
+    since: Instant,
+    status_sequence: u32,
+}
+
+/// The sequence numbers already handed over.
+#[derive(Default)]
+struct Seen {
+    frame: u32,
+    answers: u32,
+    sent: u32,
+    status: u32,
+    /// Oldest sample of the newest command that followed the hand.
+    stamp: Option<Instant>,
+}
+
+impl Worker {
+    fn run(mut self, app: &mut PcApp) {
+        app.run(|app| {
+            self.obey(app);
+            self.hand_over(app);
+            self.ended(app.telemetry())
+        });
+    }
+
+    fn obey(&mut self, app: &mut PcApp) {
+        loop {
+            match self.orders.try_recv() {
+                Ok(Order::Engage) if self.ending.is_none() => app.engage(),
+                Ok(Order::Activate) if self.ending.is_none() => app.activate(),
+                Ok(Order::Calibrate) if self.ending.is_none() => app.calibrate_flat_hand(),
+                Ok(Order::Engage | Order::Activate | Order::Calibrate) => {}
+                Ok(Order::Release) => app.release(),
+                // Whoever gave orders is gone: the same as a stop.
+                Ok(Order::Stop) | Err(TryRecvError::Disconnected) => return self.end(app),
+                Err(TryRecvError::Empty) => return,
+            }
+        }
+    }
+
+    fn end(&mut self, app: &mut PcApp) {
+        if self.ending.is_none() {
+            app.release();
+            let telemetry = app.telemetry();
+            self.ending = Some(Ending {
+                since: telemetry.now,
+                status_sequence: telemetry.status_sequence,
+            });
+        }
+    }
+
+    /// Whether the hold has arrived, or the wait for it is over.
+    fn ended(&self, telemetry: &Telemetry<AXES>) -> bool {
+        self.ending.is_some_and(|ending| {
+            let answered = telemetry
+                .status_sequence
+                .wrapping_sub(ending.status_sequence);
+            let waited = telemetry.now.checked_duration_since(ending.since);
+            answered >= HOLD_CYCLES || waited.is_some_and(|waited| waited >= HOLD_WAIT)
+        })
+    }
+
+    fn hand_over(&mut self, app: &mut PcApp) {
+        let telemetry = *app.telemetry();
+        let answers = telemetry.counters.answered_frames;
+        if telemetry.frame_sequence != self.seen.frame {
+            let answered = answers != self.seen.answers;
+            let answered = telemetry.state.is_moving().then_some(answered);
+            if let Some(frame) = frame_record(&telemetry, answered) {
+                self.send(Record::Frame(Box::new(frame)));
+            }
+        }
+        if let Some(sent) = telemetry.sent
+            && telemetry.sent_sequence != self.seen.sent
+        {
+            self.send(Record::Command(self.command_record(&sent)));
+        }
+        if let Some(status) = telemetry.status
+            && telemetry.status_sequence != self.seen.status
+        {
+            self.send(Record::Status(status));
+        }
+        while let Some(event) = app.next_event() {
+            self.send(Record::Event {
+                at: event.at,
+                sort: sort(&event.kind),
+                text: event.kind.to_string(),
+            });
+        }
+        self.seen = Seen {
+            frame: telemetry.frame_sequence,
+            answers,
+            sent: telemetry.sent_sequence,
+            stamp: telemetry
+                .sent
+                .filter(|sent| sent.follows)
+                .map(|sent| sent.stamp),
+            status: telemetry.status_sequence,
+        };
+        *lock(&self.snapshot) = Some(telemetry);
+    }
+
+    fn command_record(&self, sent: &Sent<AXES>) -> Command {
+        let age = sent.at.checked_duration_since(sent.stamp);
+        Command {
+            at: sent.at,
+            motion: sent.motion,
+            age_us: age.filter(|_| sent.follows).map(|age| age.as_micros()),
+            first: sent.follows && self.seen.stamp != Some(sent.stamp),
+        }
+    }
+
+    fn send(&self, record: Record) {
+        if self.records.try_send(record).is_err() {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// Whether an event is something wrong, or merely something that happened.
+fn sort(kind: &Kind) -> Sort {
+    let fault = match kind {
+        Kind::Calibrated => return Sort::Calibrated,
+        Kind::State { to, .. } => match to {
+            State::Holding(HoldReason::Settling | HoldReason::GripperNotReady(_)) => false,
+            State::Holding(_) | State::SafeAction(_) | State::Faulted(_) => true,
+            State::Idle | State::Blending | State::Following => false,
+        },
+        Kind::GripperFault(fault) => *fault != gripper::Fault::None,
+        Kind::SensorLost { .. }
+        | Kind::SensorRestarted { .. }
+        | Kind::Glove { answers: false }
+        | Kind::Gripper { answers: false }
+        | Kind::CalibrationFailed { .. }
+        | Kind::NoWeights
+        | Kind::Refused(_) => true,
+        _ => false,
+    };
+    if fault { Sort::Fault } else { Sort::Note }
+}
+
+fn frame_record(telemetry: &Telemetry<AXES>, answered: Option<bool>) -> Option<Frame> {
+    let frame = telemetry.frame.as_ref()?;
+    let imus = frame.samples.map(|sample| {
+        let quaternion = sample.orientation.as_ref();
+        Imu {
+            quaternion: [quaternion.w, quaternion.i, quaternion.j, quaternion.k],
+            stamp: sample.stamp,
+            health: words::health(sample.health),
+            good: sample.health == scan::Health::Good,
+        }
+    });
+    Some(Frame {
+        at: telemetry.now,
+        sequence: frame.sequence,
+        imus,
+        angles: telemetry.angles,
+        angles_valid: telemetry.angles_valid,
+        map_output: telemetry.map_output,
+        answered,
+    })
+}
