@@ -94,6 +94,7 @@ struct State {
     counters: Counters,
     to_device: Direction,
     to_client: Direction,
+    echo: bool,
 }
 
 impl Direction {
@@ -174,6 +175,11 @@ impl Control {
         }
     }
 
+    /// Gives every byte written back to the writer, as an RS-485 adapter does that hears itself.
+    pub fn echo(&self, echo: bool) {
+        lock(&self.0).echo = echo;
+    }
+
     /// What has happened so far.
     #[must_use]
     pub fn counters(&self) -> Counters {
@@ -197,6 +203,7 @@ impl<P> Faulty<P> {
             counters: Counters::default(),
             to_device: Direction::new(to_device),
             to_client: Direction::new(to_client),
+            echo: false,
         };
         Self {
             port,
@@ -226,6 +233,7 @@ impl<P: Read + ReadReady + Write> Faulty<P> {
             counters,
             to_device,
             to_client,
+            ..
         } = &mut *state;
         for _ in 0..to_device.ready(now) {
             let Some((at, byte)) = to_device.held.pop_front() else {
@@ -288,10 +296,14 @@ impl<P: Read + ReadReady + Write> Write for Faulty<P> {
                 random,
                 counters,
                 to_device,
-                ..
+                to_client,
+                echo,
             } = &mut *state;
             for byte in buf {
                 to_device.take(*byte, now, random, counters);
+                if *echo && to_client.held.len() < QUEUE {
+                    to_client.held.push_back((now, *byte));
+                }
             }
         }
         self.pump().map_err(FaultyError::Port)?;

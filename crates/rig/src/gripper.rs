@@ -185,6 +185,19 @@ impl VirtualGripper {
         self.with_axis(index, |a| a.position = counts);
     }
 
+    /// Makes it what a program finds that starts anew beside a running gripper: activated, rACT set in
+    /// the command block, nothing moving.
+    pub fn preset_active(&self) {
+        let mut server = self.server();
+        server.command = [0; 16];
+        server.command[0] = 0x01;
+        match &mut server.model {
+            Model::Three(three) => three.preset_active(),
+            Model::Two(two) => two.preset_active(),
+        }
+        server.show_status();
+    }
+
     /// Puts an object where axis `index` meets it when it closes, or takes it away.
     pub fn set_object(&self, index: usize, at: Option<f32>) {
         self.with_axis(index, |a| a.object = at);

@@ -404,6 +404,22 @@ fn connecting_and_reading_moves_nothing() {
 }
 
 #[test]
+fn a_gripper_found_active_has_not_moved() {
+    let config = Config {
+        start: [90.0, 90.0, 90.0, 137.0],
+        ..Config::default()
+    };
+    let mut bench = Bench::new(config);
+    bench.gripper.preset_active();
+    bench.wait_ms(20);
+    assert_eq!(bench.status(8)[..5], [0x31, 0, 0, 0, 90]);
+    assert_eq!((bench.gripper.motions(), bench.gripper.writes()), (0, 0));
+    bench.command(&individual([100, 90, 90, 137], 100));
+    bench.settle();
+    assert_eq!(bench.gripper.positions()[0], 100.0);
+}
+
+#[test]
 fn a_muted_gripper_obeys_and_says_nothing() {
     let mut bench = active();
     bench.gripper.mute(1);

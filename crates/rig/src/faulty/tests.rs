@@ -118,3 +118,16 @@ fn a_cut_can_be_repaired() {
     port.control().cut(false);
     assert_eq!(exchange(&clock, &mut port, &[3, 4]), [3, 4]);
 }
+
+#[test]
+fn an_echoing_adapter_gives_back_what_was_written() {
+    let (clock, mut port) = port(1, Faults::default(), Faults::default());
+    port.control().echo(true);
+    let mut back = exchange(&clock, &mut port, &[1, 2, 3]);
+    assert_eq!(
+        back.split_off(3),
+        [1, 2, 3],
+        "the device's own answer comes after"
+    );
+    assert_eq!(back, [1, 2, 3]);
+}

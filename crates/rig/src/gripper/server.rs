@@ -75,7 +75,7 @@ impl Server {
             mute: 0,
             reply_delay: Duration::from_ticks(0),
         };
-        server.status = server.model_status();
+        server.show_status();
         server
     }
 
@@ -113,6 +113,11 @@ impl Server {
             Model::Three(three) => three.status(),
             Model::Two(two) => two.status(),
         }
+    }
+
+    /// Puts the model's state into the registers before the next refresh does.
+    pub fn show_status(&mut self) {
+        self.status = self.model_status();
     }
 
     /// The status block as a read would give it.

@@ -153,6 +153,12 @@ impl ThreeFinger {
         }
     }
 
+    /// Activated without the motion that belongs to it.
+    pub fn preset_active(&mut self) {
+        self.was_activated = true;
+        self.ready();
+    }
+
     /// The status block.
     pub fn status(&self) -> [u8; 16] {
         let imc: u8 = match self.state {

@@ -113,6 +113,12 @@ impl TwoFinger {
         }
     }
 
+    /// Activated without the motion that belongs to it.
+    pub fn preset_active(&mut self) {
+        self.was_activated = true;
+        self.ready();
+    }
+
     /// The status block: 6 bytes, the rest 0.
     pub fn status(&self) -> [u8; 16] {
         let sta: u8 = match self.state {
