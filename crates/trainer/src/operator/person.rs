@@ -11,7 +11,7 @@ use crate::motion::joints::{COUNT, Finger, THUMB_FLEXIONS};
 /// Share of the frames at each end that count as straight or curled, together or apart.
 const END: f64 = 0.1;
 /// How far a shown pose is drawn to the recorded poses most like it: 0 not at all, 1 fully.
-const PULL: f32 = 0.25;
+const PULL: f32 = 0.6;
 /// How alike a recorded pose must be to count much, in the units of a posture.
 const REACH: f32 = 0.12;
 
