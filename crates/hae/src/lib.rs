@@ -26,6 +26,7 @@
 #![deny(unsafe_code)]
 
 pub mod image;
+pub mod quantized;
 pub mod reference;
 
 mod kernel;
@@ -33,6 +34,9 @@ mod map;
 
 pub use kernel::{Kernel, PackedBuffer, packed_len};
 pub use map::{INPUT_LIMIT, InputError, Map, RepackError};
+
+#[cfg(target_endian = "big")]
+compile_error!("weights images are read in place and are little-endian");
 
 /// Lanes of the output sums; hidden units are padded to a multiple of it.
 pub const LANES: usize = 16;

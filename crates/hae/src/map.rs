@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use crate::image::{self, Checked, Error, HEADER_LEN, JointOrder};
-use crate::kernel::{Kernel, Weights};
+use crate::image::{self, Checked, Element, Error, HEADER_LEN, JointOrder};
+use crate::kernel::{IntegerWeights, Kernel, Weights};
 
 /// Largest magnitude of an input: 2π rad (as f32, 6.2831855).
 pub const INPUT_LIMIT: f32 = core::f32::consts::TAU;
@@ -34,7 +34,13 @@ impl core::error::Error for InputError {}
 /// It borrows its weights; making one from checked bytes costs a few comparisons.
 #[derive(Clone, Copy, Debug)]
 pub struct Map<'w, const Q: usize, const H: usize, const X: usize> {
-    weights: Weights<'w, Q, H, X>,
+    weights: Parts<'w, Q, H, X>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum Parts<'w, const Q: usize, const H: usize, const X: usize> {
+    Float(Weights<'w, Q, H, X>),
+    Integer(IntegerWeights<'w, Q, H, X>),
 }
 
 impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
@@ -82,10 +88,14 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
         {
             return None;
         }
-        let words = bytemuck::try_cast_slice(bytes.get(HEADER_LEN..checked.length)?).ok()?;
-        Some(Self {
-            weights: Weights::in_image(words)?,
-        })
+        let words = bytes.get(HEADER_LEN..checked.length)?;
+        let weights = match checked.element {
+            Element::F32 => Parts::Float(Weights::in_image(bytemuck::try_cast_slice(words).ok()?)?),
+            Element::I16 => Parts::Integer(IntegerWeights::in_image(
+                bytemuck::try_cast_slice(words).ok()?,
+            )?),
+        };
+        Some(Self { weights })
     }
 
     /// The same map with its weights copied to `buffer` in the order of this machine's fastest kernel, which is chosen
@@ -101,8 +111,8 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
     /// As [`Map::repack`] for a kernel that is named.
     ///
     /// # Errors
-    /// A buffer that is too short or not aligned; a kernel that this machine cannot run or that has no order of its own;
-    /// a map that was repacked already.
+    /// A buffer that is too short or not aligned; a kernel that this machine cannot run; a map that was repacked already
+    /// or is in 16-bit integers.
     pub fn repack_for<'b>(
         &self,
         kernel: Kernel,
@@ -117,26 +127,46 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
         if offset != 0 {
             return Err(RepackError::Alignment { offset });
         }
-        match self.weights.repack(kernel, buffer) {
-            Some(weights) => Ok(Map { weights }),
+        let repacked = match self.weights {
+            Parts::Float(weights) => weights.repack(kernel, buffer),
+            Parts::Integer(_) => None,
+        };
+        match repacked {
+            Some(weights) => Ok(Map {
+                weights: Parts::Float(weights),
+            }),
             None => Err(RepackError::Kernel { kernel }),
         }
     }
 
     /// The same map with the portable kernel; `None` if it was repacked for another.
     pub fn portable(self) -> Option<Self> {
-        Some(Self {
-            weights: self.weights.portable()?,
-        })
+        let weights = match self.weights {
+            Parts::Float(weights) => Parts::Float(weights.portable()?),
+            Parts::Integer(weights) => Parts::Integer(weights.portable()),
+        };
+        Some(Self { weights })
     }
 
     /// The kernel that computes this map.
     pub fn kernel(&self) -> Kernel {
-        self.weights.kernel()
+        match self.weights {
+            Parts::Float(weights) => weights.kernel(),
+            Parts::Integer(weights) => weights.kernel(),
+        }
     }
 
-    /// f(q): radians in, counts out, in exactly the [arithmetic of this crate](crate#the-arithmetic). The outputs are
-    /// finite; they may lie outside 0 … 255.
+    /// How the image stores the weights, and so which arithmetic this map follows.
+    pub fn element(&self) -> Element {
+        match self.weights {
+            Parts::Float(_) => Element::F32,
+            Parts::Integer(_) => Element::I16,
+        }
+    }
+
+    /// f(q): radians in, counts out, in exactly the [arithmetic of this crate](crate#the-arithmetic), or that of the
+    /// [16-bit map](crate::quantized#the-arithmetic) if the image is one. The outputs are finite; they may lie outside
+    /// 0 … 255.
     ///
     /// # Errors
     /// An input that is NaN, infinite or beyond ±2π.
@@ -145,7 +175,10 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
         if !all_in_range(q) {
             return Err(first_out_of_range(q));
         }
-        Ok(self.weights.eval(q))
+        Ok(match &self.weights {
+            Parts::Float(weights) => weights.eval(q),
+            Parts::Integer(weights) => weights.eval(q),
+        })
     }
 }
 
@@ -164,7 +197,8 @@ pub enum RepackError {
         /// Its address modulo 64.
         offset: usize,
     },
-    /// This machine cannot run the kernel, or the map is not in the image's order any more.
+    /// This machine cannot run the kernel, the map is not in the image's order any more, or it is in 16-bit integers,
+    /// which have no other order.
     Kernel {
         /// The kernel asked for.
         kernel: Kernel,

@@ -1,6 +1,9 @@
 //! The networks and inputs whose output bits are compared between machines: made from integers, so that every machine
 //! makes the same. Shared by the chip's image and the host's benchmark.
 
+/// Calibration poses of the 16-bit maps.
+pub const POSES: usize = 16;
+
 /// Marsaglia's xorshift32.
 pub struct Random(pub u32);
 

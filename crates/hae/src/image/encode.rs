@@ -74,6 +74,16 @@ impl Parameters<'_> {
             Err(Error::Overflow)
         }
     }
+
+    /// [`Parameters::check`], and that the joint order goes with the number of inputs.
+    pub(crate) fn check_for(&self, meta: &Meta) -> Result<(), Error> {
+        self.check()?;
+        let (order, inputs) = (meta.joint_order, self.inputs);
+        if order.inputs().is_some_and(|n| n != inputs) {
+            return Err(Error::JointOrderInputs { order, inputs });
+        }
+        Ok(())
+    }
 }
 
 /// Bytes of an f32 image of this shape: 192 + 64·⌈H/16⌉·(1 + Q + X) + 64·⌈X/16⌉.
@@ -87,19 +97,13 @@ pub const fn encoded_len(inputs: usize, hidden: usize, outputs: usize) -> usize 
 /// Parameters that are not fit for an image ([`Parameters::check`]), a joint order that does not go with the number of
 /// inputs, or a buffer that is too small; `out` is then unchanged.
 pub fn encode(parameters: &Parameters<'_>, meta: &Meta, out: &mut [u8]) -> Result<usize, Error> {
-    parameters.check()?;
+    parameters.check_for(meta)?;
     let &Parameters {
         inputs,
         hidden,
         outputs,
         ..
     } = parameters;
-    if meta.joint_order.inputs().is_some_and(|n| n != inputs) {
-        return Err(Error::JointOrderInputs {
-            order: meta.joint_order,
-            inputs,
-        });
-    }
     let length = encoded_len(inputs, hidden, outputs);
     let found = out.len();
     let Some(out) = out.get_mut(..length) else {

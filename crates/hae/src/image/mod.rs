@@ -15,6 +15,7 @@ mod error;
 mod verify;
 
 pub use encode::{Parameters, encode, encoded_len};
+pub(crate) use encode::{put_header, seal};
 pub use error::Error;
 pub(crate) use verify::stated_crc;
 pub use verify::{Verifier, parse, parse_exact};
@@ -106,6 +107,19 @@ impl JointOrder {
 pub enum Element {
     /// IEEE 754 binary32.
     F32 = 1,
+    /// 16-bit integers ([`quantized`](crate::quantized)).
+    I16 = 2,
+}
+
+impl Element {
+    /// The element type with this id, if there is one.
+    pub const fn from_id(id: u16) -> Option<Self> {
+        match id {
+            1 => Some(Self::F32),
+            2 => Some(Self::I16),
+            _ => None,
+        }
+    }
 }
 
 /// What the maker of an image says about it.

@@ -1,4 +1,4 @@
-//! Image bytes to a [`Checked`] token: the full check, at once or in pieces.
+//! Image bytes to a [`Checked`] token: the full check, at once or in pieces. Without panics: every access is a `get`.
 
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
@@ -6,6 +6,7 @@ use super::{
     ALIGNMENT, Checked, Element, Error, FORMAT, HEADER_LEN, Header, JointOrder, MAGIC, Meta,
     encoded_len, lane_words, offset, record_words, shape_is_valid,
 };
+use crate::quantized::{self, TileCheck};
 use crate::{INPUT_LIMIT, LANES, units_per_lane};
 
 /// CRC-32 as in zip and Ethernet: polynomial 0x04C11DB7 reflected, initial and final exclusive-or 0xFFFFFFFF.
@@ -14,11 +15,18 @@ static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// Bytes that one [`Verifier::step`] takes at most through the CRC.
 const CRC_STEP: usize = 1024;
 
+/// Adds the bytes from `start` to `end` to the digest, without the CRC's own four.
+fn update(digest: &mut Digest<'static, u32>, image: &[u8], start: usize, end: usize) {
+    const OWN_END: usize = offset::CRC + 4;
+    for (start, end) in [(start, end.min(offset::CRC)), (start.max(OWN_END), end)] {
+        digest.update(image.get(start..end).unwrap_or(&[]));
+    }
+}
+
 /// CRC-32 of a whole image, its own four bytes left out.
 pub(crate) fn crc32(image: &[u8]) -> u32 {
     let mut digest = CRC32.digest();
-    digest.update(&image[..offset::CRC]);
-    digest.update(&image[offset::CRC + 4..]);
+    update(&mut digest, image, 0, image.len());
     digest.finalize()
 }
 
@@ -67,6 +75,7 @@ enum Stage {
         next: usize,
         bound: HiddenBound,
     },
+    Tiles(TileCheck),
 }
 
 impl Verifier {
@@ -97,10 +106,10 @@ impl Verifier {
                 needed: header.length,
             });
         };
-        match &mut self.stage {
+        let done = match &mut self.stage {
             Stage::Crc { next, digest } => {
                 let end = (*next + CRC_STEP).min(image.len());
-                update_without_own_bytes(digest, image, *next, end);
+                update(digest, image, *next, end);
                 *next = end;
                 if end == image.len() {
                     let computed = digest.clone().finalize();
@@ -110,48 +119,38 @@ impl Verifier {
                             computed,
                         });
                     }
-                    check_reserved(image, offset::RESERVED, HEADER_LEN)?;
-                    self.stage = Stage::Lanes {
-                        next: 0,
-                        bound: HiddenBound::new(),
+                    check_zero(image, offset::RESERVED, HEADER_LEN)?;
+                    self.stage = match header.element {
+                        Element::F32 => Stage::Lanes {
+                            next: 0,
+                            bound: HiddenBound::new(),
+                        },
+                        Element::I16 => Stage::Tiles(TileCheck::new(&header)),
                     };
                 }
+                false
             }
-            Stage::Lanes { next, bound } => {
-                let words = payload(image, &header)?;
-                if *next < LANES {
-                    check_lane(words, &header, *next, bound)?;
-                    *next += 1;
-                } else {
-                    check_output_bias(image, words, &header, bound)?;
-                    return Ok(Some(Checked { header }));
-                }
+            Stage::Lanes { next, bound } if *next < LANES => {
+                check_lane(payload(image)?, &header, *next, bound)?;
+                *next += 1;
+                false
             }
-        }
-        Ok(None)
-    }
-}
-
-fn update_without_own_bytes(
-    digest: &mut Digest<'static, u32>,
-    image: &[u8],
-    start: usize,
-    end: usize,
-) {
-    if start == 0 {
-        digest.update(&image[..offset::CRC]);
-        digest.update(&image[offset::CRC + 4..end]);
-    } else {
-        digest.update(&image[start..end]);
+            Stage::Lanes { bound, .. } => {
+                check_output_bias(image, &header, bound)?;
+                true
+            }
+            Stage::Tiles(check) => check.step(payload(image)?)?,
+        };
+        Ok(done.then_some(Checked { header }))
     }
 }
 
 fn field<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    let mut field = [0; N];
-    if let Some(source) = bytes.get(at..at + N) {
-        field.copy_from_slice(source);
-    }
-    field
+    bytes
+        .get(at..)
+        .and_then(|bytes| bytes.first_chunk())
+        .copied()
+        .unwrap_or([0; N])
 }
 
 fn u16_at(bytes: &[u8], at: usize) -> u16 {
@@ -187,10 +186,8 @@ fn read_header(bytes: &[u8]) -> Result<Header, Error> {
     if usize::from(header_len) != HEADER_LEN {
         return Err(Error::HeaderLength { found: header_len });
     }
-    let element = match u16_at(bytes, offset::ELEMENT) {
-        1 => Element::F32,
-        found => return Err(Error::Element { found }),
-    };
+    let element = u16_at(bytes, offset::ELEMENT);
+    let element = Element::from_id(element).ok_or(Error::Element { found: element })?;
     let order = u16_at(bytes, offset::ORDER);
     let joint_order = JointOrder::from_id(order).ok_or(Error::JointOrder { found: order })?;
     let shape =
@@ -206,7 +203,10 @@ fn read_header(bytes: &[u8]) -> Result<Header, Error> {
         });
     }
     let length = u32_at(bytes, offset::LENGTH) as usize;
-    let expected = encoded_len(inputs, hidden, outputs);
+    let expected = match element {
+        Element::F32 => encoded_len(inputs, hidden, outputs),
+        Element::I16 => quantized::encoded_len(inputs, hidden, outputs),
+    };
     if length != expected {
         return Err(Error::Length {
             found: length,
@@ -239,21 +239,17 @@ fn read_header(bytes: &[u8]) -> Result<Header, Error> {
     })
 }
 
-fn check_reserved(image: &[u8], start: usize, end: usize) -> Result<(), Error> {
-    match image[start..end].iter().position(|&byte| byte != 0) {
+fn check_zero(image: &[u8], start: usize, end: usize) -> Result<(), Error> {
+    let bytes = image.get(start..end).unwrap_or(&[]);
+    match bytes.iter().position(|&byte| byte != 0) {
         Some(at) => Err(Error::Reserved { offset: start + at }),
         None => Ok(()),
     }
 }
 
-/// The words after the header: lane records, b2, padding.
-fn payload<'a>(image: &'a [u8], header: &Header) -> Result<&'a [f32], Error> {
-    let bytes = image
-        .get(HEADER_LEN..header.length)
-        .ok_or(Error::Truncated {
-            found: image.len(),
-            needed: header.length,
-        })?;
+/// The words after the header.
+fn payload<T: bytemuck::AnyBitPattern>(image: &[u8]) -> Result<&[T], Error> {
+    let bytes = image.get(HEADER_LEN..).unwrap_or(&[]);
     bytemuck::try_cast_slice(bytes).map_err(|_| Error::Alignment {
         offset: bytes.as_ptr().addr() % ALIGNMENT,
     })
@@ -269,50 +265,40 @@ fn check_lane(
     let stride = record_words(header.inputs, header.hidden, header.outputs);
     let units = units_per_lane(header.hidden);
     let start = lane * stride;
-    let record = &words[start..start + stride];
+    let record = words.get(start..start + stride).unwrap_or(&[]);
     let byte_offset = |word: usize| HEADER_LEN + 4 * (start + word);
     if let Some(at) = record.iter().position(|v| !v.is_finite()) {
         return Err(Error::NotFinite {
             at: byte_offset(at),
         });
     }
-    for m in 0..units {
-        let column = || record.iter().skip(m).step_by(units);
-        if m * LANES + lane >= header.hidden {
-            if let Some(section) = column().position(|v| v.to_bits() != 0) {
-                return Err(Error::Reserved {
-                    offset: byte_offset(section * units + m),
-                });
-            }
-        } else {
+    for (m, &b1) in record.iter().enumerate().take(units) {
+        let column = || record.iter().skip(m).step_by(units.max(1));
+        if m * LANES + lane < header.hidden {
             bound.unit(
-                record[m],
+                b1,
                 column().skip(1).take(header.inputs),
                 column().skip(1 + header.inputs),
             );
+        } else if let Some(section) = column().position(|v| v.to_bits() != 0) {
+            return Err(Error::Reserved {
+                offset: byte_offset(section * units + m),
+            });
         }
     }
     Ok(())
 }
 
-fn check_output_bias(
-    image: &[u8],
-    words: &[f32],
-    header: &Header,
-    bound: &HiddenBound,
-) -> Result<(), Error> {
+fn check_output_bias(image: &[u8], header: &Header, bound: &HiddenBound) -> Result<(), Error> {
     let start = lane_words(header.inputs, header.hidden, header.outputs);
-    let b2 = &words[start..start + header.outputs];
+    let end = start + header.outputs;
+    let b2 = payload::<f32>(image)?.get(start..end).unwrap_or(&[]);
     if let Some(at) = b2.iter().position(|v| !v.is_finite()) {
         return Err(Error::NotFinite {
             at: HEADER_LEN + 4 * (start + at),
         });
     }
-    check_reserved(
-        image,
-        HEADER_LEN + 4 * (start + header.outputs),
-        header.length,
-    )?;
+    check_zero(image, HEADER_LEN + 4 * end, header.length)?;
     if bound.is_safe(b2.iter()) {
         Ok(())
     } else {

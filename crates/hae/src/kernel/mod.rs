@@ -9,6 +9,7 @@
 
 #[cfg(cortex_m4f)]
 mod cortex_m4f;
+mod integer;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;
@@ -16,6 +17,7 @@ mod portable;
 mod x86;
 
 use crate::image::{lane_words, record_words};
+use crate::quantized::Layout;
 use crate::{LANES, units_per_lane};
 
 /// The code that computes a map. All give the same bits.
@@ -24,7 +26,8 @@ use crate::{LANES, units_per_lane};
 pub enum Kernel {
     /// Plain Rust for any machine, on the image in place.
     Portable,
-    /// Assembly for Cortex-M4F and M7, on the image in place; for 289 to 304 hidden units (19 in a lane).
+    /// Assembly for Cortex-M4F and M7, on the image in place: f32 for 289 to 304 hidden units (19 in a lane), 16-bit
+    /// integers for 25 inputs.
     CortexM4f,
     /// x86-64, 4 lanes a register.
     Sse2,
@@ -196,6 +199,50 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Weights<'w, Q, H, X> {
                 _ => portable::eval::<Q, H, X>(self.words, q),
             }
         }
+    }
+}
+
+/// The words of a 16-bit image after its header.
+///
+/// Invariant: `words` holds all words of the layout; the kernel goes with the shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct IntegerWeights<'w, const Q: usize, const H: usize, const X: usize> {
+    words: &'w [u32],
+    kernel: Kernel,
+}
+
+impl<'w, const Q: usize, const H: usize, const X: usize> IntegerWeights<'w, Q, H, X> {
+    /// `None` if there are too few words.
+    pub(crate) fn in_image(words: &'w [u32]) -> Option<Self> {
+        let words = words.get(..Layout::new(Q, H, X).words)?;
+        let kernel = match Q {
+            #[cfg(cortex_m4f)]
+            cortex_m4f::I16_INPUTS => Kernel::CortexM4f,
+            _ => Kernel::Portable,
+        };
+        Some(Self { words, kernel })
+    }
+
+    pub(crate) fn kernel(&self) -> Kernel {
+        self.kernel
+    }
+
+    pub(crate) fn portable(self) -> Self {
+        Self {
+            kernel: Kernel::Portable,
+            ..self
+        }
+    }
+
+    /// f(q) for inputs that were checked.
+    #[inline]
+    pub(crate) fn eval(&self, q: &[f32; Q]) -> [f32; X] {
+        #[cfg(cortex_m4f)]
+        if self.kernel == Kernel::CortexM4f && H > 0 && X > 0 {
+            // SAFETY: the type's invariants are the kernel's preconditions.
+            return unsafe { cortex_m4f::eval_i16::<Q, X>(self.words, &Layout::new(Q, H, X), q) };
+        }
+        integer::eval::<Q, H, X>(self.words, q)
     }
 }
 

@@ -8,7 +8,7 @@ use core::arch::{asm, global_asm};
 use core::fmt::Write;
 use core::hint::black_box;
 
-use hae::Map;
+use hae::{Map, quantized};
 use hae::image::{JointOrder, Meta, Parameters, encode};
 
 #[path = "../workload.rs"]
@@ -117,6 +117,7 @@ fn stack(mut work: impl FnMut()) -> usize {
 struct Store([u8; 40_000]);
 
 static mut IMAGE: Store = Store([0; 40_000]);
+static mut POSES: [f32; 1_000] = [0.0; 1_000];
 static mut FLOATS: [f32; 10_000] = [0.0; 10_000];
 
 /// Counts one shape: its image in place, the kernel the map chooses and the portable one.
@@ -139,6 +140,20 @@ fn shape<const Q: usize, const H: usize, const X: usize>(samples: usize) {
     let map = Map::<Q, H, X>::from_image(bytes).expect("a sound image");
     measure("f32", &map, random.0, samples);
     measure("f32", &map.portable().expect("an image in place"), random.0, samples);
+
+    let seed = random.0;
+    // SAFETY: as above.
+    let poses = unsafe { &mut *(&raw mut POSES) };
+    let poses = &mut poses[..workload::POSES * Q];
+    poses.iter_mut().for_each(|q| *q = random.signed(1.6));
+    quantized::encode(&parameters, poses, &meta, bytes).expect("sound parameters");
+    let parse = count(|| {
+        let _ = black_box(hae::image::parse(black_box(bytes)));
+    });
+    let _ = writeln!(Console, "count i16 {Q}x{H}x{X} parse {parse}");
+    let map = Map::<Q, H, X>::from_image(bytes).expect("a sound image");
+    measure("i16", &map, seed, samples);
+    measure("i16", &map.portable().expect("an image in place"), seed, samples);
 }
 
 fn measure<const Q: usize, const H: usize, const X: usize>(
