@@ -129,7 +129,7 @@ fn from_power_on_to_good_frames_by_itself() {
 
 #[test]
 fn a_scan_takes_about_as_long_as_its_bytes() {
-    for (baud, at_most) in [(115_200, 34_200), (230_400, 19_700), (460_800, 12_400)] {
+    for (baud, at_most) in [(115_200, 30_600), (230_400, 17_700), (460_800, 11_300)] {
         let mut bench = Bench::with(waving, baud, Config::default()).up();
         let frames = bench.until_timed(5_000_000);
         let (first, last) = (frames[0].0, frames[frames.len() - 1].0);

@@ -267,8 +267,13 @@ fn a_lost_reply_byte_is_named_and_costs_no_resync() {
 #[test]
 fn late_bytes_are_not_taken_for_the_status_nor_for_the_next_reply() {
     let (mut machine, port) = up();
-    // The reply comes while its status is awaited, and its first byte looks like a status.
-    let late = vec![(26_000 + 4_500, vec![0xF1, 2, 3, 4, 5, 6, 7, 8])];
+    // The reply comes while its status is awaited, byte by byte, and its first byte looks like a status.
+    let reply = [0xF1, 2, 3, 4, 5, 6, 7, 8];
+    let late = reply
+        .iter()
+        .zip(0..)
+        .map(|(b, n)| (30_500 + 87 * n, vec![*b]))
+        .collect();
     port.expect([
         Exchange {
             expect: vec![0x53, 0x53, 0x08, 0x50],

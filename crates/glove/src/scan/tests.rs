@@ -255,6 +255,11 @@ fn a_sensor_that_stays_bad_is_brought_up_again_ever_more_rarely() {
     let resets = run.chip(2).resets;
     assert!((5..15).contains(&resets), "{resets} resets in 20 s");
     assert!(frames.len() > 1_000);
+    assert_eq!(
+        run.scanner.counters().zero,
+        0,
+        "zeros before the first output are no fault"
+    );
 }
 
 #[test]
@@ -371,9 +376,16 @@ fn a_dead_link_costs_nothing_but_its_state_and_the_sensors_are_not_blamed() {
         (run.scanner.state(), run.scanner.bus_mut().batches),
         (State::Resync, before)
     );
+    // Nobody knows what the sensors' register pointers did meanwhile.
+    (0..16).for_each(|k| run.chip(k).pointer = 0);
     run.scanner.bus_mut().up = true;
     let frames = run.for_ms(100);
     assert_eq!(frames.last().unwrap().good(), ALL);
+    assert_eq!(
+        run.scanner.counters().restarted,
+        0,
+        "pointers are written anew"
+    );
     assert!(
         (0..16).all(|k| run.chip(k).resets == 1),
         "no sensor is brought up again"

@@ -50,6 +50,20 @@ fn a_selection_that_is_not_acknowledged_is_forgotten() {
     assert_eq!(frames[0].samples[0].health, Health::Missing(cause));
 }
 
+#[test]
+fn a_channel_is_forgotten_on_any_bus_error() {
+    let nack = ErrorKind::NoAcknowledge(NoAcknowledgeSource::Data);
+    let mut script = bring_up_of_all();
+    script.extend(first_scan());
+    // The last sensor's read fails on a channel that was selected and read back.
+    let last = script.pop().unwrap();
+    script.push(last.with_error(nack));
+    // It is rechecked at once, and its channel is not believed.
+    script.extend(select(7, 0x80));
+    let frames = run_script(&script, 1);
+    assert_eq!(frames[0].good(), ALL & !(1 << 15));
+}
+
 /// Runs a scanner on a scripted I²C bus until it has given so many frames; the script must be used up.
 fn run_script(script: &[Expect], count: usize) -> Vec<Frame> {
     let mut scanner = BusScanner::on(Direct::new(Mock::new(script)), Config::default());
