@@ -1,274 +1,17 @@
-//! The loop: scanner, posture, map, supervisor, gripper, store, tied together.
-//!
-//! [`App::step`] does what is due and returns when the next thing is; it never waits. Every device is polled at most twice
-//! a step and does a bounded amount of work, so a step's time does not depend on what a device does: dead, babbling or fast.
-//!
-//! **When the supervisor steps.** On a grid of 10 ms, and besides in the very step that takes a new frame, so that a fresh
-//! frame is answered at once instead of up to 10 ms later. The supervisor takes time as an argument and its rate limit
-//! counts elapsed time, so the additional steps change no limit. The grid does not move with them.
-//!
-//! **What `latency` measures.** From the stamp of the oldest sample used (when its request was sent) to the moment the
-//! driver handed the request that carries the command to its port: seen by the link's count of requests going up in a poll
-//! while the command is set. The 29 bytes of the request then take 2.5 ms at 115200 baud.
+//! What one step does, piece by piece.
 
-use crate::config::Config;
-use crate::event::{self, Event, Kind, Request};
+use super::App;
+use crate::event::{Event, Kind, Request};
 use crate::platform::{Platform, Slot};
-use crate::posture::{self, Posture};
-use crate::store::{Expected, WeightsStore};
-use crate::supervisor::{Hand, Inputs, Output, State, Supervisor, Weights};
-use crate::telemetry::{Sent, Telemetry, bump};
+use crate::posture;
+use crate::supervisor::{Hand, Inputs, Output, State, Weights};
+use crate::telemetry::{Sent, bump};
 use crate::{Duration, HIDDEN, HoldReason, Instant, timing};
 use embedded_io::{Read, ReadReady, Write};
 use glove::hand::{Calibration, JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::{Frame, Scanner};
+use glove::scan::Frame;
 use gripper::registers::Fault;
 use gripper::{Gripper, Status};
-use hae::image::JointOrder;
-
-/// What an image must be for a bridge whose gripper has `axes` axes.
-pub const fn expected(axes: usize) -> Expected {
-    Expected {
-        shape: [JOINT_COUNT, HIDDEN, axes],
-        joint_order: JointOrder::Hand25,
-    }
-}
-
-/// The bridge: `P` the machine, `G` the glove's port, `R` the gripper, `F` a flash slot, `X` the gripper's number of axes.
-#[derive(Debug)]
-pub struct App<P, G, R, F, const X: usize>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
-    platform: P,
-    scanner: Scanner<G>,
-    gripper: R,
-    store: WeightsStore<F>,
-    supervisor: Supervisor<X>,
-    posture: Posture,
-    hand: Option<Hand<X>>,
-    heartbeat: Option<Instant>,
-    /// Next step of the supervisor on its grid.
-    due: Option<Instant>,
-    /// What the driver was told last; `at` is when it was decided until it leaves.
-    order: Option<Sent<X>>,
-    stashed: Option<Result<Status<X>, R::Error>>,
-    gripper_error: Option<R::Error>,
-    sensors: Sensors,
-    calibration_until: Option<Instant>,
-    weights: Option<(usize, u32)>,
-    frame_at: Option<Instant>,
-    telemetry: Telemetry<X>,
-    events: heapless::Deque<Event, { event::CAPACITY }>,
-}
-
-/// What is known of each sensor.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sensors {
-    /// Newest frame with a good sample of it.
-    good: [Option<Instant>; SEGMENT_COUNT],
-    /// Told to be lost (bit k: segment k).
-    lost: u16,
-    /// How often each had been started when the calibration was made; `None` without one.
-    starts: Option<[u16; SEGMENT_COUNT]>,
-}
-
-impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
-    /// Ties the parts together. Sends nothing; the newest whole image of the store is the map.
-    pub fn new(
-        mut platform: P,
-        scanner: Scanner<G>,
-        gripper: R,
-        store: WeightsStore<F>,
-        config: Config<X>,
-    ) -> Self {
-        let now = platform.now();
-        let mut app = Self {
-            platform,
-            telemetry: Telemetry::new(now, scanner.state()),
-            scanner,
-            gripper,
-            store,
-            supervisor: Supervisor::new(config),
-            posture: Posture::new(config.settings().side, Calibration::identity()),
-            hand: None,
-            heartbeat: None,
-            due: None,
-            order: None,
-            stashed: None,
-            gripper_error: None,
-            sensors: Sensors::default(),
-            calibration_until: None,
-            weights: None,
-            frame_at: None,
-            events: heapless::Deque::new(),
-        };
-        if app.store.active().is_none() {
-            app.tell(now, Kind::NoWeights);
-        }
-        app
-    }
-
-    /// Does what is due and returns when the next thing is. Never waits; at most 1 ms, whatever the devices do.
-    pub fn step(&mut self) -> Instant {
-        let now = self.platform.now();
-        self.poll_gripper(now);
-        let frame = self.scanner.poll(now);
-        if let Some(frame) = &frame {
-            self.take_frame(now, frame);
-        }
-        self.watch(now);
-        if frame.is_some() || self.due.is_none_or(|due| now >= due) {
-            self.supervise(now, frame.is_some());
-            // The line may be free: then the command leaves now. What this poll finds is taken in the next step.
-            if self.gripper.next_due() <= now {
-                self.stashed = self.poll_and_see(now);
-            }
-        }
-        self.telemetry.now = now;
-        self.next_due(now)
-    }
-
-    /// Steps and waits until `until` says so; it is asked before every step and may look at everything.
-    pub fn run(&mut self, mut until: impl FnMut(&mut Self) -> bool) {
-        while !until(self) {
-            let due = self.step();
-            self.platform.wait_until(due);
-        }
-    }
-
-    /// Closes the clutch, and keeps it closed for 250 ms: call it every 100 ms.
-    pub fn engage(&mut self) {
-        let now = self.platform.now();
-        if self.heartbeat.replace(now).is_none() {
-            self.due = Some(now);
-        }
-        self.lock();
-    }
-
-    /// Opens the clutch: the next step holds.
-    pub fn release(&mut self) {
-        self.heartbeat = None;
-        self.due = Some(self.platform.now());
-    }
-
-    /// Asks the gripper to activate: **it moves**. Refused, with an event, while it follows the hand.
-    pub fn activate(&mut self) {
-        let now = self.platform.now();
-        if self.supervisor.state().is_moving() {
-            self.tell(now, Kind::Refused(Request::Activate));
-        } else {
-            self.gripper.activate();
-            self.tell(now, Kind::ActivationRequested);
-        }
-    }
-
-    /// Takes the next complete frame as the flat hand: every joint angle of it becomes zero. An event tells the end,
-    /// after 2 s at the latest. Refused, with an event, while the clutch is closed.
-    pub fn calibrate_flat_hand(&mut self) {
-        let now = self.platform.now();
-        if self.is_engaged() {
-            self.tell(now, Kind::Refused(Request::Calibrate));
-        } else {
-            self.calibration_until = now.checked_add_duration(timing::CALIBRATION_WAIT);
-        }
-    }
-
-    /// Takes a calibration that was made before. Refused, with an event, while the clutch is closed.
-    pub fn set_calibration(&mut self, calibration: Calibration) {
-        let now = self.platform.now();
-        if self.is_engaged() {
-            self.tell(now, Kind::Refused(Request::Calibrate));
-        } else {
-            self.calibrate(calibration);
-        }
-    }
-
-    /// The calibration in use.
-    pub fn calibration(&self) -> &Calibration {
-        self.posture.calibration()
-    }
-
-    /// Takes another configuration.
-    ///
-    /// # Errors
-    /// The configuration comes back while the clutch is closed: nothing changes then.
-    pub fn set_config(&mut self, config: Config<X>) -> Result<(), Config<X>> {
-        if self.is_engaged() {
-            return Err(config);
-        }
-        if config.settings().side != self.config().settings().side {
-            self.posture = Posture::new(config.settings().side, *self.posture.calibration());
-        }
-        self.supervisor = Supervisor::new(config);
-        Ok(())
-    }
-
-    /// The configuration.
-    pub fn config(&self) -> &Config<X> {
-        self.supervisor.config()
-    }
-
-    /// Whether the clutch is closed, or motion under it has not ended.
-    pub fn is_engaged(&self) -> bool {
-        self.heartbeat.is_some() || self.supervisor.state() != State::Idle
-    }
-
-    /// What is known after the newest step.
-    pub fn telemetry(&self) -> &Telemetry<X> {
-        &self.telemetry
-    }
-
-    /// Why the newest failed cycle of the gripper failed.
-    pub fn gripper_error(&self) -> Option<R::Error> {
-        self.gripper_error
-    }
-
-    /// The oldest event that was not taken yet.
-    pub fn next_event(&mut self) -> Option<Event> {
-        self.events.pop_front()
-    }
-
-    /// The weights store. While the clutch is closed it refuses to write.
-    pub fn store_mut(&mut self) -> &mut WeightsStore<F> {
-        self.lock();
-        &mut self.store
-    }
-
-    /// The weights store, to look at.
-    pub fn store(&self) -> &WeightsStore<F> {
-        &self.store
-    }
-
-    /// The glove's scanner: its counters, its port.
-    pub fn scanner_mut(&mut self) -> &mut Scanner<G> {
-        &mut self.scanner
-    }
-
-    /// The gripper. Setting motions past the bridge is the caller's responsibility; the next step sets its own.
-    pub fn gripper_mut(&mut self) -> &mut R {
-        &mut self.gripper
-    }
-
-    /// The platform.
-    pub fn platform_mut(&mut self) -> &mut P {
-        &mut self.platform
-    }
-
-    /// Gives everything back.
-    pub fn into_parts(self) -> (P, Scanner<G>, R, WeightsStore<F>) {
-        (self.platform, self.scanner, self.gripper, self.store)
-    }
-}
 
 impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
 where
@@ -278,10 +21,10 @@ where
     F: Slot,
 {
     /// Polls the gripper and sees whether a command left.
-    fn poll_and_see(&mut self, now: Instant) -> Option<Result<Status<X>, R::Error>> {
-        let before = self.gripper.counters().requests;
+    pub(super) fn poll_and_see(&mut self, now: Instant) -> Option<Result<Status<X>, R::Error>> {
+        let before = self.gripper.counters().writes;
         let result = self.gripper.poll(now);
-        let sent = self.gripper.counters().requests != before;
+        let sent = self.gripper.counters().writes != before;
         if sent
             && let Some(order) = self
                 .order
@@ -292,7 +35,7 @@ where
         result
     }
 
-    fn poll_gripper(&mut self, now: Instant) {
+    pub(super) fn poll_gripper(&mut self, now: Instant) {
         let result = match self.stashed.take() {
             Some(result) => Some(result),
             None => self.poll_and_see(now),
@@ -318,7 +61,7 @@ where
         }
     }
 
-    fn take_frame(&mut self, now: Instant, frame: &Frame) {
+    pub(super) fn take_frame(&mut self, now: Instant, frame: &Frame) {
         if !self.telemetry.glove_answers {
             self.telemetry.glove_answers = true;
             self.tell(now, Kind::Glove { answers: true });
@@ -393,13 +136,13 @@ where
     }
 
     /// A calibration belongs to the headings the sensors have now; at least their first start has happened or will.
-    fn calibrate(&mut self, calibration: Calibration) {
+    pub(super) fn calibrate(&mut self, calibration: Calibration) {
         self.posture.calibrate(calibration);
         self.sensors.starts = Some(self.scanner.counters().starts.map(|starts| starts.max(1)));
     }
 
     /// What is told when nothing happens.
-    fn watch(&mut self, now: Instant) {
+    pub(super) fn watch(&mut self, now: Instant) {
         let stale =
             |stamp: Option<Instant>| stamp.is_none_or(|stamp| age(now, stamp) > timing::SILENT);
         if self.telemetry.gripper_answers && stale(self.telemetry.status.map(|status| status.stamp))
@@ -440,7 +183,7 @@ where
         }
     }
 
-    fn supervise(&mut self, now: Instant, fresh: bool) {
+    pub(super) fn supervise(&mut self, now: Instant, fresh: bool) {
         let inputs = Inputs {
             heartbeat: self.heartbeat,
             hand: self.hand,
@@ -504,13 +247,13 @@ where
         }
     }
 
-    fn lock(&mut self) {
+    pub(super) fn lock(&mut self) {
         // An image that was begun before the clutch closed may be finished: the supervisor holds until then.
         let locked = self.is_engaged() && self.store.progress().is_none();
         self.store.set_locked(locked);
     }
 
-    fn next_due(&self, now: Instant) -> Instant {
+    pub(super) fn next_due(&self, now: Instant) -> Instant {
         if self.stashed.is_some() {
             return now;
         }
@@ -521,7 +264,7 @@ where
         next
     }
 
-    fn tell(&mut self, at: Instant, kind: Kind) {
+    pub(super) fn tell(&mut self, at: Instant, kind: Kind) {
         let event = Event { at, kind };
         if let Err(event) = self.events.push_back(event) {
             let _ = self.events.pop_front();
