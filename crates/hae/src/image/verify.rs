@@ -1,5 +1,7 @@
 //! Image bytes to a [`Checked`] token: the full check, at once or in pieces. Without panics: every access is a `get`.
 
+use core::ops::Range;
+
 use crc::{CRC_32_ISO_HDLC, Crc, Digest};
 
 use super::{
@@ -272,15 +274,15 @@ fn check_lane(
             at: byte_offset(at),
         });
     }
+    let sections = 1 + header.inputs + header.outputs;
     for (m, &b1) in record.iter().enumerate().take(units) {
-        let column = || record.iter().skip(m).step_by(units.max(1));
+        let column = |sections: Range<usize>| {
+            sections.filter_map(move |section| record.get(section * units + m))
+        };
         if m * LANES + lane < header.hidden {
-            bound.unit(
-                b1,
-                column().skip(1).take(header.inputs),
-                column().skip(1 + header.inputs),
-            );
-        } else if let Some(section) = column().position(|v| v.to_bits() != 0) {
+            let second = 1 + header.inputs;
+            bound.unit(b1, column(1..second), column(second..sections));
+        } else if let Some(section) = column(0..sections).position(|v| v.to_bits() != 0) {
             return Err(Error::Reserved {
                 offset: byte_offset(section * units + m),
             });

@@ -247,11 +247,9 @@ impl<'w, const Q: usize, const H: usize, const X: usize> IntegerWeights<'w, Q, H
 }
 
 /// Sums 16 lanes: distance 8, 4, 2, 1.
-fn halving_tree(sums: &mut [f32; LANES]) -> f32 {
-    for distance in [8, 4, 2, 1] {
-        for k in 0..distance {
-            sums[k] += sums[k + distance];
-        }
-    }
-    sums[0]
+fn halving_tree(sums: &[f32; LANES]) -> f32 {
+    let eight: [f32; 8] = core::array::from_fn(|k| sums[k] + sums[k + 8]);
+    let four: [f32; 4] = core::array::from_fn(|k| eight[k] + eight[k + 4]);
+    let [a, b, c, d] = four;
+    (a + c) + (b + d)
 }

@@ -30,7 +30,7 @@ pub(super) fn eval<const Q: usize, const H: usize, const X: usize>(
         eval_lane::<Q, H, X>(record, q, lane, &mut sums);
     }
     let mut y = [0.0; X];
-    for ((y, sums), b2) in y.iter_mut().zip(&mut sums).zip(records.remainder()) {
+    for ((y, sums), b2) in y.iter_mut().zip(&sums).zip(records.remainder()) {
         *y = halving_tree(sums) + b2;
     }
     y

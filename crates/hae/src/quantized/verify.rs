@@ -38,13 +38,17 @@ impl TileCheck {
     fn tile(&self, words: &[u32], tile: usize) -> Result<(), Error> {
         let start = tile * self.layout.tile_words;
         for unit in 0..TILE {
-            let column = || words.iter().skip(start + unit).step_by(TILE);
-            let bias = i64::from(column().next().map_or(0, |word| word.cast_signed()));
-            let weights = column().skip(1).take(self.layout.pairs);
-            let mut bound = bias.abs();
+            let column = |first: usize, stride: usize, count: usize| {
+                (0..count).filter_map(move |row| words.get(first + row * stride).copied())
+            };
+            let bias = column(start + unit, TILE, 1)
+                .next()
+                .unwrap_or(0)
+                .cast_signed();
+            let mut bound = i64::from(bias).abs();
             let mut odd = 0;
-            for word in weights {
-                let [low, high] = halves(*word);
+            for word in column(start + TILE + unit, TILE, self.layout.pairs) {
+                let [low, high] = halves(word);
                 bound += 32_768 * i64::from(low.abs() + high.abs());
                 odd = high;
             }
@@ -54,13 +58,9 @@ impl TileCheck {
                     offset: HEADER_LEN + 4 * at + 2,
                 });
             }
-            let second = words
-                .iter()
-                .skip(start + TILE * (1 + self.layout.pairs) + unit / 2)
-                .step_by(TILE / 2);
-            let mut second = second
-                .take(self.layout.outputs)
-                .map(|word| halves(*word)[unit % 2]);
+            let second = start + TILE * (1 + self.layout.pairs) + unit / 2;
+            let mut second =
+                column(second, TILE / 2, self.layout.outputs).map(|word| halves(word)[unit % 2]);
             let padded = tile * TILE + unit >= self.hidden;
             if padded && (bound != 0 || second.any(|w| w != 0)) {
                 return Err(Error::Reserved {
