@@ -22,6 +22,9 @@ const HEARTBEAT: u64 = 100_000;
 /// Long enough for the slowest way through: blend, filter, and a full stroke.
 const SETTLE: u64 = 5_000_000;
 
+/// A hand closes in this time, seconds.
+const MOVE_S: f64 = 0.4;
+
 struct Machine(Clock);
 
 impl Platform for Machine {
@@ -42,6 +45,7 @@ struct Bench {
     clock: Clock,
     glove: VirtualGlove,
     gripper: VirtualGripper,
+    pose: [f32; 25],
 }
 
 impl Bench {
@@ -51,8 +55,10 @@ impl Bench {
         let gripper = VirtualGripper::new(rig::gripper::Config::default());
         let glove_wire = MemoryWire::new(&clock, glove.clone(), BAUD);
         let gripper_wire = MemoryWire::new(&clock, gripper.clone(), BAUD);
-        let mut store =
-            WeightsStore::new([MemorySlot::new(), MemorySlot::new()], bridge::app::expected(4));
+        let mut store = WeightsStore::new(
+            [MemorySlot::new(), MemorySlot::new()],
+            bridge::app::expected(4),
+        );
         store.begin(image.len()).unwrap();
         store.chunk(0, image).unwrap();
         store.commit().unwrap();
@@ -63,7 +69,13 @@ impl Bench {
             store,
             Config::default(),
         );
-        Self { app, clock, glove, gripper }
+        Self {
+            app,
+            clock,
+            glove,
+            gripper,
+            pose,
+        }
     }
 
     /// Runs for `time` microseconds with the clutch open or closed.
@@ -77,12 +89,20 @@ impl Bench {
                 beat = now + HEARTBEAT;
             }
             let due = self.app.step();
-            self.app.platform_mut().wait_until(due.min(Instant::from_ticks(end)));
+            self.app
+                .platform_mut()
+                .wait_until(due.min(Instant::from_ticks(end)));
         }
     }
 
+    /// Goes to `pose` as fast as a brisk hand, then stays.
     fn show(&mut self, pose: [f32; 25]) {
-        self.glove.set_pose(Box::new(move |_| pose));
+        let (from, start) = (self.pose, self.clock.now().as_ticks() as f64 * 1e-6);
+        self.glove.set_pose(Box::new(move |time_s: f64| {
+            let share = ((time_s - start) / MOVE_S).clamp(0.0, 1.0) as f32;
+            core::array::from_fn(|joint| from[joint] + share * (pose[joint] - from[joint]))
+        }));
+        self.pose = pose;
         self.run(SETTLE, true);
     }
 }
@@ -117,19 +137,31 @@ fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
     assert_eq!(bench.app.telemetry().state, State::Following);
     let open = bench.gripper.positions();
     println!("standing {standing:.0?}, flat hand {open:.0?}");
-    assert!(open[..3].iter().all(|&finger| finger <= 30.0), "flat hand: {open:?}");
+    assert!(
+        open[..3].iter().all(|&finger| finger <= 30.0),
+        "flat hand: {open:?}"
+    );
 
     bench.show(hand.fist());
     let closed = bench.gripper.positions();
     println!("fist {closed:.0?}");
-    assert!(closed[..3].iter().all(|&finger| finger >= 225.0), "fist: {closed:?}");
+    assert!(
+        closed[..3].iter().all(|&finger| finger >= 225.0),
+        "fist: {closed:?}"
+    );
 
     bench.show(hand.flat_hand());
     let open = bench.gripper.positions();
-    assert!(open[..3].iter().all(|&finger| finger <= 30.0), "flat hand again: {open:?}");
+    assert!(
+        open[..3].iter().all(|&finger| finger <= 30.0),
+        "flat hand again: {open:?}"
+    );
 
     let counters = bench.app.telemetry().counters;
     assert_eq!(counters.late_steps, 0);
     assert_eq!(counters.unusable_frames, 0);
-    assert!(counters.answered_frames >= 20 * 3 * SETTLE as u32 / 1_000_000, "{counters:?}");
+    assert!(
+        counters.answered_frames >= 20 * 3 * SETTLE as u32 / 1_000_000,
+        "{counters:?}"
+    );
 }
