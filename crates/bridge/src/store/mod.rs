@@ -66,13 +66,12 @@ struct Write {
     length: usize,
     /// Bytes in flash; the page buffer comes after.
     programmed: usize,
-    page: [u8; PAGE],
-    filled: usize,
+    page: heapless::Vec<u8, PAGE>,
 }
 
 impl Write {
     fn taken(&self) -> usize {
-        self.programmed + self.filled
+        self.programmed + self.page.len()
     }
 }
 
@@ -94,15 +93,14 @@ impl<F: Slot> WeightsStore<F> {
             inspect(0, &slots[0], &expected),
             inspect(1, &slots[1], &expected),
         ];
-        let sequence = |slot: usize| match &contents[slot] {
+        let [first, second] = [&contents[0], &contents[1]].map(|contents| match contents {
             Contents::Whole(image) => Some(image.sequence),
             _ => None,
-        };
-        let active = match (sequence(0), sequence(1)) {
-            (Some(a), Some(b)) => Some(usize::from(b > a)),
-            (Some(_), None) => Some(0),
-            (None, Some(_)) => Some(1),
-            (None, None) => None,
+        });
+        // None is below every sequence.
+        let active = match first.max(second) {
+            None => None,
+            newest => Some(usize::from(newest != first)),
         };
         Self {
             slots,
@@ -117,7 +115,7 @@ impl<F: Slot> WeightsStore<F> {
     /// The active slot and its image.
     pub fn active(&self) -> Option<(usize, &Image)> {
         let slot = self.active?;
-        match &self.contents[slot] {
+        match self.contents.get(slot)? {
             Contents::Whole(image) => Some((slot, image)),
             _ => None,
         }
@@ -131,7 +129,7 @@ impl<F: Slot> WeightsStore<F> {
     /// The active image's bytes.
     pub fn active_bytes(&self) -> Option<&[u8]> {
         let (slot, image) = self.active()?;
-        self.slots[slot].mapped().get(..image.checked.length)
+        self.slot(slot).mapped().get(..image.checked.length)
     }
 
     /// The map of the active image, a view into its flash; no check beyond a few comparisons.
@@ -139,7 +137,7 @@ impl<F: Slot> WeightsStore<F> {
         &self,
     ) -> Option<hae::Map<'_, Q, H, X>> {
         let (slot, image) = self.active()?;
-        hae::Map::view(self.slots[slot].mapped(), &image.checked)
+        hae::Map::view(self.slot(slot).mapped(), &image.checked)
     }
 
     /// What an image must be to be taken.
@@ -188,15 +186,14 @@ impl<F: Slot> WeightsStore<F> {
         if length > capacity {
             return Err(Error::TooLong { length, capacity });
         }
-        self.contents[slot] = Contents::Empty;
-        let (start, end) = records(&self.slots[slot]);
+        self.set_contents(slot, Contents::Empty);
+        let (start, end) = records(self.slot(slot));
         self.erase(slot, start, end)?;
         self.write = Some(Write {
             slot,
             length,
             programmed: 0,
-            page: [0xFF; PAGE],
-            filled: 0,
+            page: heapless::Vec::new(),
         });
         Ok(())
     }
@@ -258,16 +255,33 @@ impl<F: Slot> WeightsStore<F> {
         if self.active == Some(slot) {
             return Ok(());
         }
-        let (start, end) = records(&self.slots[slot]);
+        let (start, end) = records(self.slot(slot));
         let free = (start..end)
             .step_by(stride::<F>())
-            .find(|&at| is_erased(self.slots[slot].mapped().get(at..at + stride::<F>())))
+            .find(|&at| is_erased(self.slot(slot).mapped().get(at..at + stride::<F>())))
             .ok_or(Error::RecordsFull { slot })?;
         self.record(slot, free, image.checked)
     }
 }
 
 impl<F: Slot> WeightsStore<F> {
+    /// The slot of this number; every number but 0 is 1. No way to panic, unlike an index.
+    fn slot(&self, slot: usize) -> &F {
+        let [first, second] = &self.slots;
+        if slot == 0 { first } else { second }
+    }
+
+    fn slot_mut(&mut self, slot: usize) -> &mut F {
+        let [first, second] = &mut self.slots;
+        if slot == 0 { first } else { second }
+    }
+
+    fn set_contents(&mut self, slot: usize, contents: Contents) {
+        if let Some(place) = self.contents.get_mut(slot) {
+            *place = contents;
+        }
+    }
+
     fn check_unlocked(&self) -> Result<(), Error> {
         if self.locked {
             Err(Error::Engaged)
@@ -277,14 +291,14 @@ impl<F: Slot> WeightsStore<F> {
     }
 
     fn check_geometry(&self, slot: usize) -> Result<(), Error> {
-        if fits(&self.slots[slot]) {
+        if fits(self.slot(slot)) {
             Ok(())
         } else {
             Err(Error::Geometry {
                 slot,
                 write_size: F::WRITE_SIZE,
                 erase_size: F::ERASE_SIZE,
-                capacity: self.slots[slot].capacity(),
+                capacity: self.slot(slot).capacity(),
             })
         }
     }
@@ -293,40 +307,41 @@ impl<F: Slot> WeightsStore<F> {
     fn take(&mut self, mut bytes: &[u8]) -> Result<(), Error> {
         while !bytes.is_empty() {
             let write = self.write.as_mut().ok_or(Error::NotBegun)?;
-            let (now, rest) = bytes.split_at(bytes.len().min(PAGE - write.filled));
-            write.page[write.filled..write.filled + now.len()].copy_from_slice(now);
-            write.filled += now.len();
+            let room = PAGE.saturating_sub(write.page.len());
+            let (now, rest) = bytes.split_at_checked(room).unwrap_or((bytes, &[]));
+            // There is room: `now` is not longer.
+            let _ = write.page.extend_from_slice(now);
             bytes = rest;
-            if write.filled == PAGE {
+            if write.page.is_full() {
                 self.program_page()?;
             }
         }
         Ok(())
     }
 
-    /// Programs the page buffer, erasing the block first when it begins one.
+    /// Programs the page, padded to program units, erasing every block it begins first.
     fn program_page(&mut self) -> Result<(), Error> {
-        let write = self.write.as_ref().ok_or(Error::NotBegun)?;
-        let (slot, at, page, filled) = (write.slot, write.programmed, write.page, write.filled);
-        let padded = filled.next_multiple_of(F::WRITE_SIZE);
+        let write = self.write.as_mut().ok_or(Error::NotBegun)?;
+        let mut page = core::mem::take(&mut write.page);
+        let (slot, at) = (write.slot, write.programmed);
+        write.programmed += page.len();
+        let _ = page.resize(page.len().next_multiple_of(F::WRITE_SIZE), 0xFF);
         let first = at.next_multiple_of(F::ERASE_SIZE);
-        for block in (first..at + padded).step_by(F::ERASE_SIZE) {
+        for block in (first..at + page.len()).step_by(F::ERASE_SIZE) {
             self.erase(slot, block, block + F::ERASE_SIZE)?;
         }
-        self.program(slot, at, &page[..padded])?;
-        if let Some(write) = &mut self.write {
-            write.programmed += filled;
-            write.filled = 0;
-            write.page = [0xFF; PAGE];
-        }
-        Ok(())
+        self.program(slot, at, &page)
     }
 
     fn finish(&mut self, slot: usize, length: usize) -> Result<(), Error> {
-        if self.write.as_ref().is_some_and(|write| write.filled > 0) {
+        if self
+            .write
+            .as_ref()
+            .is_some_and(|write| !write.page.is_empty())
+        {
             self.program_page()?;
         }
-        let checked = check(self.slots[slot].mapped(), &self.expected)?;
+        let checked = check(self.slot(slot).mapped(), &self.expected)?;
         if checked.length != length {
             return Err(Error::Length {
                 found: checked.length,
@@ -341,7 +356,7 @@ impl<F: Slot> WeightsStore<F> {
                 active: active.checked.meta.version,
             });
         }
-        let (start, _) = records(&self.slots[slot]);
+        let (start, _) = records(self.slot(slot));
         self.record(slot, start, checked)
     }
 
@@ -363,10 +378,11 @@ impl<F: Slot> WeightsStore<F> {
             length: checked.length as u32,
             crc: checked.crc,
         };
-        let mut unit = [0xFF; PAGE];
-        unit[..record::LEN].copy_from_slice(&record.emit());
-        self.program(slot, at, &unit[..stride::<F>()])?;
-        self.contents[slot] = Contents::Whole(Image { checked, sequence });
+        let mut unit = heapless::Vec::<u8, PAGE>::new();
+        let _ = unit.extend_from_slice(&record.emit());
+        let _ = unit.resize(stride::<F>(), 0xFF);
+        self.program(slot, at, &unit)?;
+        self.set_contents(slot, Contents::Whole(Image { checked, sequence }));
         self.active = Some(slot);
         Ok(())
     }
@@ -377,10 +393,10 @@ impl<F: Slot> WeightsStore<F> {
             offset: from,
             kind: error.kind(),
         };
-        self.slots[slot]
+        self.slot_mut(slot)
             .erase(from as u32, to as u32)
             .map_err(flash)?;
-        if is_erased(self.slots[slot].mapped().get(from..to)) {
+        if is_erased(self.slot(slot).mapped().get(from..to)) {
             Ok(())
         } else {
             Err(Error::ReadBack { slot, offset: from })
@@ -393,8 +409,8 @@ impl<F: Slot> WeightsStore<F> {
             offset: at,
             kind: error.kind(),
         };
-        self.slots[slot].write(at as u32, bytes).map_err(flash)?;
-        if self.slots[slot].mapped().get(at..at + bytes.len()) == Some(bytes) {
+        self.slot_mut(slot).write(at as u32, bytes).map_err(flash)?;
+        if self.slot(slot).mapped().get(at..at + bytes.len()) == Some(bytes) {
             Ok(())
         } else {
             Err(Error::ReadBack { slot, offset: at })
