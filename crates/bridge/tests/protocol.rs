@@ -1,0 +1,471 @@
+//! The host protocol: frames, sessions, weights over the line, refusals; the host's end is written here, on postcard, cobs
+//! and a CRC of its own.
+
+mod common;
+
+use bridge::protocol::message::{
+    Answer, CHUNK, Call, Counters, FromBridge, Refusal, Reply, Request, SlotContents, VERSION,
+};
+use bridge::protocol::{Outcome, Server, frame};
+use bridge::{Settings, State, store};
+use common::bench::{Bench, MS, S};
+use common::hand_image;
+use embedded_io::{ErrorType, Read, ReadReady, Write};
+use std::cell::RefCell;
+use std::collections::VecDeque;
+use std::rc::Rc;
+
+/// Both directions of a line between host and bridge, no bytes lost.
+#[derive(Clone, Default)]
+struct Line {
+    to_bridge: Rc<RefCell<VecDeque<u8>>>,
+    to_host: Rc<RefCell<VecDeque<u8>>>,
+}
+
+impl ErrorType for Line {
+    type Error = core::convert::Infallible;
+}
+
+impl ReadReady for Line {
+    fn read_ready(&mut self) -> Result<bool, Self::Error> {
+        Ok(!self.to_bridge.borrow().is_empty())
+    }
+}
+
+impl Read for Line {
+    fn read(&mut self, out: &mut [u8]) -> Result<usize, Self::Error> {
+        let mut bytes = self.to_bridge.borrow_mut();
+        let count = out.len().min(bytes.len());
+        for (place, byte) in out.iter_mut().zip(bytes.drain(..count)) {
+            *place = byte;
+        }
+        Ok(count)
+    }
+}
+
+impl Write for Line {
+    /// Seven bytes at a time: a port that takes frames in pieces.
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> {
+        let count = bytes.len().min(7);
+        self.to_host.borrow_mut().extend(&bytes[..count]);
+        Ok(count)
+    }
+
+    fn flush(&mut self) -> Result<(), Self::Error> {
+        Ok(())
+    }
+}
+
+/// Bitwise CRC-32/ISO-HDLC, independent of the crate the bridge uses.
+fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            if crc & 1 == 1 {
+                (crc >> 1) ^ 0xEDB8_8320
+            } else {
+                crc >> 1
+            }
+        })
+    })
+}
+
+fn framed(message: &[u8]) -> Vec<u8> {
+    let mut body = message.to_vec();
+    body.extend(crc32(message).to_le_bytes());
+    let mut out = vec![0; body.len() + body.len() / 254 + 1];
+    let length = cobs::encode(&body, &mut out);
+    out.truncate(length);
+    out.push(0);
+    out
+}
+
+struct Host {
+    bench: Bench,
+    line: Line,
+    server: Server<Line>,
+    sequence: u16,
+    heard: Vec<u8>,
+    outcome: Outcome,
+}
+
+impl Host {
+    fn new(bench: Bench) -> Self {
+        let line = Line::default();
+        Self {
+            server: Server::new(line.clone()),
+            bench,
+            line,
+            sequence: 0,
+            heard: Vec::new(),
+            outcome: Outcome::Continue,
+        }
+    }
+
+    fn turn(&mut self) {
+        self.bench.step();
+        let now = self.bench.app.telemetry().now;
+        self.outcome = self.server.poll(now, &mut self.bench.app);
+    }
+
+    fn run(&mut self, us: u64) {
+        let end = self.bench.now() + us;
+        while self.bench.now() < end {
+            self.turn();
+        }
+    }
+
+    fn say(&mut self, bytes: &[u8]) {
+        self.line.to_bridge.borrow_mut().extend(bytes);
+    }
+
+    fn hear(&mut self) -> Option<FromBridge> {
+        while let Some(byte) = { self.line.to_host.borrow_mut().pop_front() } {
+            if byte != 0 {
+                self.heard.push(byte);
+                continue;
+            }
+            let mut bytes = core::mem::take(&mut self.heard);
+            let length = cobs::decode_in_place(&mut bytes).unwrap();
+            let (message, crc) = bytes[..length].split_last_chunk::<4>().unwrap();
+            assert_eq!(crc32(message), u32::from_le_bytes(*crc));
+            return Some(postcard::from_bytes(message).unwrap());
+        }
+        None
+    }
+
+    fn send(&mut self, session: u32, sequence: u16, call: Call<'_>) {
+        let mut buffer = [0; 1024];
+        let request = Request {
+            session,
+            sequence,
+            call,
+        };
+        let message = postcard::to_slice(&request, &mut buffer).unwrap();
+        let frame = framed(message);
+        self.say(&frame);
+    }
+
+    fn reply(&mut self) -> Reply {
+        for _ in 0..20_000 {
+            self.turn();
+            if let Some(FromBridge::Reply(reply)) = self.hear() {
+                return reply;
+            }
+        }
+        panic!("no reply");
+    }
+
+    fn ask_as(&mut self, session: u32, call: Call<'_>) -> Result<Answer, Refusal> {
+        self.sequence += 1;
+        self.send(session, self.sequence, call);
+        let reply = self.reply();
+        assert_eq!((reply.session, reply.sequence), (session, self.sequence));
+        reply.answer
+    }
+
+    fn ask(&mut self, call: Call<'_>) -> Result<Answer, Refusal> {
+        self.ask_as(7, call)
+    }
+
+    fn hello(mut self) -> Self {
+        let answer = self.ask(Call::Hello { version: VERSION });
+        assert!(matches!(answer, Ok(Answer::Hello(_))), "{answer:?}");
+        self
+    }
+
+    fn begin(&mut self, image: &[u8]) -> u32 {
+        let length = image.len() as u32;
+        match self.ask(Call::WeightsBegin {
+            length,
+            crc: crc32(image),
+        }) {
+            Ok(Answer::Received { bytes }) => bytes,
+            other => panic!("{other:?}"),
+        }
+    }
+
+    fn chunks(&mut self, image: &[u8], from: usize, to: usize) {
+        for (index, bytes) in image[from..to].chunks(CHUNK).enumerate() {
+            let offset = (from + index * CHUNK) as u32;
+            let answer = self.ask(Call::WeightsChunk { offset, bytes });
+            assert_eq!(
+                answer,
+                Ok(Answer::Received {
+                    bytes: offset + bytes.len() as u32
+                })
+            );
+        }
+    }
+
+    fn flash(&mut self, image: &[u8]) -> Result<Answer, Refusal> {
+        assert_eq!(self.begin(image), 0);
+        self.chunks(image, 0, image.len());
+        self.ask(Call::WeightsCommit)
+    }
+
+    fn counters(&mut self) -> Counters {
+        match self.ask(Call::Counters) {
+            Ok(Answer::Counters(counters)) => counters,
+            other => panic!("{other:?}"),
+        }
+    }
+}
+
+fn without_weights() -> Host {
+    Host::new(Bench::with(
+        Settings::default(),
+        None,
+        rig::gripper::Config::default(),
+    ))
+}
+
+fn following() -> Host {
+    let mut bench = Bench::new(Settings::default());
+    bench.ready();
+    let mut host = Host::new(bench).hello();
+    for _ in 0..30 {
+        host.ask(Call::Engage).unwrap();
+        host.run(100 * MS);
+    }
+    assert_eq!(host.bench.state(), State::Following);
+    host
+}
+
+#[test]
+fn hello_and_status_have_the_bytes_that_the_protocol_document_prints() {
+    let mut host = without_weights();
+    host.say(&[0x08, 0x07, 0x01, 0x00]); // noise, then a zero ends it
+    host.say(&framed(&[0x07, 0x01, 0x00, 0x01]));
+    let reply = host.reply();
+    assert_eq!((reply.session, reply.sequence), (7, 1));
+    let Ok(Answer::Hello(hello)) = reply.answer else {
+        panic!("{reply:?}")
+    };
+    assert_eq!(hello.version, 1);
+    assert_eq!(hello.shape, [25, 300, 4]);
+    assert_eq!(hello.joint_order, 1);
+    host.say(&framed(&[0x07, 0x02, 0x01]));
+    assert!(matches!(host.reply().answer, Ok(Answer::Status(_))));
+}
+
+#[test]
+fn another_version_and_requests_before_hello_are_refused() {
+    let mut host = without_weights();
+    assert_eq!(host.ask(Call::Status), Err(Refusal::NoSession));
+    let answer = host.ask(Call::Hello { version: 2 });
+    assert_eq!(answer, Err(Refusal::Version { bridge: 1 }));
+    assert_eq!(host.ask(Call::Engage), Err(Refusal::NoSession));
+    assert!(!host.bench.app.is_engaged());
+}
+
+#[test]
+fn an_image_flashed_over_the_line_is_the_map_and_reads_back_by_its_crc() {
+    let mut host = without_weights().hello();
+    let image = hand_image(5);
+    let Ok(Answer::Slots(slots)) = host.flash(&image) else {
+        panic!()
+    };
+    let active = usize::from(slots.active.unwrap());
+    let SlotContents::Image {
+        version,
+        length,
+        crc,
+        ..
+    } = slots.contents[active]
+    else {
+        panic!()
+    };
+    assert_eq!(
+        (version, length, crc),
+        (5, image.len() as u32, crc32(&image))
+    );
+    assert_eq!(
+        host.bench.app.store().active_bytes().unwrap()[..image.len()],
+        image[..]
+    );
+}
+
+#[test]
+fn a_broken_transfer_goes_on_where_it_stopped_for_the_same_image_only() {
+    let mut host = without_weights().hello();
+    let image = hand_image(1);
+    host.begin(&image);
+    host.chunks(&image, 0, 8 * CHUNK);
+    host.run(3 * S); // the host is gone for longer than its lease
+    assert_eq!(host.ask(Call::Status), Err(Refusal::NoSession));
+    let mut host = host.hello();
+    assert_eq!(host.begin(&image), 8 * CHUNK as u32);
+    host.chunks(&image, 8 * CHUNK, image.len());
+    assert!(host.ask(Call::WeightsCommit).is_ok());
+
+    let other = hand_image(2);
+    host.begin(&other);
+    host.chunks(&other, 0, 4 * CHUNK);
+    let third = hand_image(3);
+    assert_eq!(
+        host.begin(&third),
+        0,
+        "another image of the same length starts anew"
+    );
+}
+
+#[test]
+fn a_request_that_comes_twice_is_done_once_and_answered_twice() {
+    let mut host = without_weights().hello();
+    let image = hand_image(1);
+    host.begin(&image);
+    host.chunks(&image, 0, image.len());
+    host.send(7, 900, Call::WeightsCommit);
+    let first = host.reply();
+    host.send(7, 900, Call::WeightsCommit);
+    assert_eq!(host.reply(), first);
+    assert!(first.answer.is_ok());
+}
+
+#[test]
+fn while_the_clutch_is_closed_weights_configuration_and_restart_are_refused() {
+    let mut host = following();
+    let image = hand_image(9);
+    let begun = host.ask(Call::WeightsBegin {
+        length: image.len() as u32,
+        crc: crc32(&image),
+    });
+    assert_eq!(begun, Err(Refusal::Store(store::Error::Engaged)));
+    let Ok(Answer::Configuration(configuration)) = host.ask(Call::ConfigurationGet) else {
+        panic!()
+    };
+    assert_eq!(
+        host.ask(Call::ConfigurationSet(configuration)),
+        Err(Refusal::Engaged)
+    );
+    assert_eq!(host.ask(Call::Reboot), Err(Refusal::Engaged));
+    assert_eq!(host.ask(Call::Activate), Err(Refusal::Engaged));
+    assert_eq!(host.outcome, Outcome::Continue);
+}
+
+#[test]
+fn the_clutch_opens_when_its_heartbeat_stops() {
+    let mut host = following();
+    host.run(300 * MS);
+    assert!(
+        matches!(host.bench.state(), State::Holding(_)),
+        "{:?}",
+        host.bench.state()
+    );
+}
+
+#[test]
+fn a_second_host_is_refused_while_the_first_holds_the_clutch_and_taken_when_it_vanished() {
+    let mut host = following();
+    let busy = host.ask_as(8, Call::Hello { version: VERSION });
+    assert_eq!(busy, Err(Refusal::Busy { session: 7 }));
+    assert_eq!(host.ask_as(8, Call::Release), Err(Refusal::NoSession));
+    host.run(4 * S);
+    assert!(host.ask_as(8, Call::Hello { version: VERSION }).is_ok());
+    assert_eq!(host.ask_as(7, Call::Engage), Err(Refusal::NoSession));
+}
+
+#[test]
+fn a_setting_out_of_range_is_refused_by_name_and_changes_nothing() {
+    let mut host = without_weights().hello();
+    let Ok(Answer::Configuration(before)) = host.ask(Call::ConfigurationGet) else {
+        panic!()
+    };
+    let mut wrong = before.clone();
+    wrong.lead = 41;
+    let refused = host.ask(Call::ConfigurationSet(wrong));
+    let Err(Refusal::Configuration {
+        key,
+        value,
+        least,
+        greatest,
+    }) = refused
+    else {
+        panic!("{refused:?}")
+    };
+    assert_eq!(
+        bridge::protocol::message::SETTING_NAMES[usize::from(key)],
+        "lead"
+    );
+    assert_eq!((value, least, greatest), (41.0, 5.0, 40.0));
+    assert_eq!(
+        host.ask(Call::ConfigurationGet),
+        Ok(Answer::Configuration(before.clone()))
+    );
+    let mut right = before;
+    right.lead = 30;
+    assert_eq!(
+        host.ask(Call::ConfigurationSet(right.clone())),
+        Ok(Answer::Configuration(right))
+    );
+}
+
+#[test]
+fn telemetry_comes_at_its_period_until_it_is_turned_off() {
+    let mut host = without_weights().hello();
+    assert_eq!(
+        host.ask(Call::Telemetry { period_ms: 5 }),
+        Err(Refusal::Period { least_ms: 20 })
+    );
+    host.ask(Call::Telemetry { period_ms: 50 }).unwrap();
+    let mut samples = 0;
+    for _ in 0..10 {
+        host.run(100 * MS);
+        while let Some(message) = host.hear() {
+            samples += u32::from(matches!(message, FromBridge::Sample(_)));
+        }
+    }
+    assert!((18..=21).contains(&samples), "{samples}");
+    host.ask(Call::Telemetry { period_ms: 0 }).unwrap();
+    host.run(500 * MS);
+    assert_eq!(host.hear(), None);
+}
+
+#[test]
+fn a_restart_comes_after_its_reply() {
+    let mut host = without_weights().hello();
+    assert_eq!(host.ask(Call::Reboot), Ok(Answer::Done));
+    host.run(50 * MS);
+    assert_eq!(host.outcome, Outcome::Reboot);
+}
+
+#[test]
+fn garbage_between_requests_is_counted_and_the_next_request_is_answered() {
+    let mut host = without_weights().hello();
+    let mut state = 0x1234_5678_u32;
+    let mut random = move || {
+        state ^= state << 13;
+        state ^= state >> 17;
+        state ^= state << 5;
+        state
+    };
+    for round in 0..500 {
+        let noise: Vec<u8> = (0..random() % 900).map(|_| random() as u8).collect();
+        host.say(&noise);
+        host.say(&[0]);
+        assert!(host.ask(Call::Status).is_ok(), "round {round}");
+    }
+    let counters = host.counters();
+    println!(
+        "host frames good/crc/coding/oversized {:?}",
+        counters.host_frames
+    );
+    assert!(counters.host_frames[1] + counters.host_frames[2] > 100);
+    host.say(&vec![0x55; 3 * frame::MAX_FRAME]);
+    host.say(&[0]);
+    assert!(host.counters().host_frames[3] > 0);
+}
+
+#[test]
+fn every_single_bit_error_in_a_request_is_refused_by_the_frame() {
+    let frame = framed(&[0x07, 0x01, 0x00, 0x01]);
+    for bit in 0..frame.len() * 8 {
+        let mut host = without_weights();
+        let mut damaged = frame.clone();
+        damaged[bit / 8] ^= 1 << (bit % 8);
+        host.say(&damaged);
+        host.say(&[0]);
+        host.run(20 * MS);
+        assert_eq!(host.hear(), None, "bit {bit}");
+    }
+}
