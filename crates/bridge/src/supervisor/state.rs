@@ -203,3 +203,67 @@ fn advance(state: State, c: &Conditions) -> State {
         _ => State::Blending,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SILENT: HoldReason = HoldReason::GripperSilent;
+    const STALE: HoldReason = HoldReason::SamplesStale;
+    const FAULT: GripperFault = GripperFault::CommandIgnored;
+
+    const STATES: [State; 7] = [
+        State::Idle,
+        State::Holding(STALE),
+        State::SafeAction(STALE),
+        State::Blending,
+        State::Following,
+        State::Faulted(FAULT),
+        State::Faulted(GripperFault::ActivationLost(Activation::Reset)),
+    ];
+
+    /// The table of docs/safety.md, row by row, first row that fits.
+    fn table(from: State, c: &Conditions) -> State {
+        let gripper = c.obstacle == Some(SILENT);
+        match (c.clutch, from, c.fault, c.obstacle) {
+            (Clutch::Open, ..) => State::Idle,
+            (Clutch::Lost, State::Idle | State::Faulted(_), ..) => State::Idle,
+            (Clutch::Lost, _, _, Some(SILENT)) => State::Holding(SILENT),
+            (Clutch::Lost, ..) if c.held_long => State::SafeAction(HoldReason::HeartbeatLost),
+            (Clutch::Lost, ..) => State::Holding(HoldReason::HeartbeatLost),
+            (Clutch::Closed, State::Faulted(old), new, _) => State::Faulted(new.unwrap_or(old)),
+            (Clutch::Closed, _, Some(fault), _) => State::Faulted(fault),
+            (Clutch::Closed, _, _, Some(obstacle)) if c.held_long && !gripper => {
+                State::SafeAction(obstacle)
+            }
+            (Clutch::Closed, _, _, Some(obstacle)) => State::Holding(obstacle),
+            (Clutch::Closed, State::Following, ..) => State::Following,
+            (Clutch::Closed, State::Blending, ..) if c.blended => State::Following,
+            (Clutch::Closed, ..) => State::Blending,
+        }
+    }
+
+    #[test]
+    fn every_transition_is_the_one_of_the_documented_table() {
+        for from in STATES {
+            for clutch in [Clutch::Open, Clutch::Lost, Clutch::Closed] {
+                for fault in [None, Some(FAULT)] {
+                    for obstacle in [None, Some(STALE), Some(SILENT)] {
+                        for (blended, held_long) in
+                            [(false, false), (false, true), (true, false), (true, true)]
+                        {
+                            let c = Conditions {
+                                clutch,
+                                fault,
+                                obstacle,
+                                blended,
+                                held_long,
+                            };
+                            assert_eq!(next(from, &c), table(from, &c), "{from:?} {c:?}");
+                        }
+                    }
+                }
+            }
+        }
+    }
+}

@@ -164,3 +164,83 @@ fn a_gripper_found_outside_the_space_opens_until_it_is_inside() {
         "{position:?}"
     );
 }
+
+/// From anywhere allowed to anywhere allowed, whatever the axes' speeds: the gripper arrives, and is inside all the way.
+#[test]
+fn every_way_through_the_configuration_space_ends_at_its_goal() {
+    let mut state = 1u32;
+    let mut byte = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    };
+    let mut longest = 0;
+    for round in 0..400 {
+        let mut position: [u8; 4] = core::array::from_fn(|_| byte());
+        let goal: [f32; 4] = limits::project(core::array::from_fn(|_| f32::from(byte())));
+        let speed: [u8; 4] = core::array::from_fn(|_| 1 + byte() % 6);
+        if !limits::inside(&position) {
+            continue;
+        }
+        let mut command = position;
+        let mut steps = 0;
+        while (0..4).any(|axis| (f32::from(position[axis]) - goal[axis]).abs() > 1.0) {
+            let wanted = core::array::from_fn(|axis| {
+                let here = f32::from(command[axis]);
+                limits::round(
+                    limits::approach(goal[axis], here, 4.0, position[axis], 40),
+                    position[axis],
+                )
+            });
+            command = limits::keep_inside(wanted, &position, &goal);
+            for axis in 0..4 {
+                assert!(command[axis].abs_diff(position[axis]) <= 40);
+                position[axis] = command[axis]
+                    .max(position[axis].saturating_sub(speed[axis]))
+                    .min(position[axis].saturating_add(speed[axis]));
+            }
+            assert!(limits::inside(&position), "round {round}: {position:?}");
+            steps += 1;
+            assert!(
+                steps < 3_000,
+                "round {round}: stuck at {position:?} for {goal:?}"
+            );
+        }
+        longest = longest.max(steps);
+    }
+    std::println!("longest way: {longest} steps");
+}
+
+#[test]
+fn a_gripper_of_one_axis_has_no_configuration_space_and_all_the_other_limits() {
+    let mut supervisor = Supervisor::<1>::new(Config::default());
+    let mut position = 3u8;
+    let mut echo = 3u8;
+    for step in 1..400u64 {
+        let now = at(step * 10 * MS);
+        let inputs = Inputs {
+            heartbeat: Some(now),
+            hand: Some(Hand {
+                sequence: step as u32,
+                stamp: now,
+                output: Ok([300.0]),
+            }),
+            status: Some(Status {
+                stamp: now,
+                activation: Activation::Ready,
+                going_to: true,
+                contact: [Contact::AtPosition],
+                echo: [echo],
+                position: [position],
+                current: [0],
+                fault: Fault::None,
+            }),
+            weights: Weights::Ready,
+        };
+        if let Some(motion) = supervisor.step(now, &inputs).motion {
+            echo = motion.position[0];
+            assert!(echo.abs_diff(position) <= 40);
+        }
+        position += (echo.saturating_sub(position)).min(2);
+    }
+    assert_eq!((echo, position), (255, 255));
+}
