@@ -26,20 +26,32 @@ const ANSWER_WAIT: Duration = Duration::from_millis(60);
 const IDLE: Duration = Duration::from_millis(700);
 /// For the new speed to be in effect.
 const SPEED_WAIT: Duration = Duration::from_millis(5);
-/// Time a gripper gets to answer a status read: some fifty cycles.
-const GRIPPER_WAIT: Duration = Duration::from_secs(1);
+/// Time a gripper gets to answer a status read: a hundred tries, for a machine that is busy.
+const GRIPPER_WAIT: Duration = Duration::from_secs(3);
 /// Pause between two looks at a port.
 const LOOK: Duration = Duration::from_millis(1);
+
+/// A glove that answers.
+#[derive(Debug)]
+pub struct Glove {
+    /// Its port, at 115200 baud.
+    pub port: Port,
+    /// Whether it spoke 9600 baud, as after power-on, and was switched.
+    pub switched: bool,
+}
 
 /// Opens the glove's port and finds its serial multiplexer, at 115200 baud or, fresh from power-on, at 9600, from where
 /// it is switched to 115200.
 ///
 /// # Errors
 /// A failure that says whether the port does not open or nobody answers on it, and what to try.
-pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Port> {
+pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
     let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
     if answers(&mut port, interrupt) {
-        return Ok(port);
+        return Ok(Glove {
+            port,
+            switched: false,
+        });
     }
     drop(port);
     let mut slow = Port::open(path, RESET_BAUD).map_err(Failure::from)?;
@@ -50,7 +62,10 @@ pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Port> {
         let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
         interrupt.sleep(SPEED_WAIT);
         if answers(&mut port, interrupt) {
-            return Ok(port);
+            return Ok(Glove {
+                port,
+                switched: true,
+            });
         }
     }
     Err(Failure::new(
@@ -98,6 +113,18 @@ fn discard(port: &mut Port) {
     }
 }
 
+/// What came instead of an answer, where it was not silence.
+fn because(error: gripper::Error) -> String {
+    use gripper::link::Error::Timeout;
+    match error {
+        gripper::Error::Link(Timeout { received: 0 }) => String::new(),
+        gripper::Error::Link(Timeout { received }) => {
+            format!("; {received} bytes came that make no reply")
+        }
+        other => format!("; {other}"),
+    }
+}
+
 /// Opens the gripper's port and reads its status.
 ///
 /// # Errors
@@ -120,7 +147,7 @@ pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Port, Status<
             None => {}
         }
     }
-    let why = last_error.map_or_else(String::new, |error| format!(" ({error})"));
+    let why = last_error.map_or_else(String::new, because);
     Err(Failure::new(
         format!(
             "no gripper answers on {}: read the status of unit {unit} at {BAUD} baud{why}",

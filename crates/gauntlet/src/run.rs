@@ -7,6 +7,7 @@ use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::State;
 use glove::hand::LIMITS;
 use gripper::Activation;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -249,6 +250,8 @@ impl Run {
                     text,
                     ..
                 } => {
+                    // The same thing again only renews what is shown.
+                    self.recent_faults.retain(|(_, known)| known != text);
                     self.recent_faults.push_back((Instant::now(), text.clone()));
                     if self.recent_faults.len() > SHOWN_FAULTS {
                         self.recent_faults.pop_front();
@@ -287,7 +290,7 @@ impl Run {
             keys,
         };
         if let Some(snapshot) = &snapshot {
-            view.state = snapshot.state.to_string();
+            view.state = snapshot.state.name().to_owned();
             view.following = snapshot.state.is_moving();
             view.fingers = fingers(snapshot);
             view.axes = axes(snapshot);
@@ -322,6 +325,9 @@ fn live_keys() -> &'static str {
 /// What is wrong now and stays so.
 fn standing_faults(snapshot: &Snapshot) -> Vec<String> {
     let mut faults = Vec::new();
+    if let State::Holding(reason) | State::SafeAction(reason) = snapshot.state {
+        faults.push(format!("held: {reason}"));
+    }
     if let Some(frame) = &snapshot.frame {
         let health = frame.samples.map(|sample| {
             (

@@ -347,9 +347,11 @@ impl Worker {
 fn sort(kind: &Kind) -> Sort {
     let fault = match kind {
         Kind::Calibrated => return Sort::Calibrated,
-        Kind::State { to, .. } => match to {
+        // A hold is a fault where it ends motion; which reason follows which is only told.
+        Kind::State { from, to } => match to {
             State::Holding(HoldReason::Settling | HoldReason::GripperNotReady(_)) => false,
-            State::Holding(_) | State::SafeAction(_) | State::Faulted(_) => true,
+            State::Holding(_) | State::SafeAction(_) => from.is_moving(),
+            State::Faulted(_) => !matches!(from, State::Faulted(_)),
             State::Idle | State::Blending | State::Following => false,
         },
         Kind::GripperFault(fault) => *fault != gripper::Fault::None,

@@ -87,8 +87,8 @@ fn trained(options: &Demo, motion: &Motion, tell: &Tell, interrupt: &Interrupt) 
         quiet: false,
     };
     tell.say(format_args!(
-        "training   {} start pairs and {PAIRS} chosen where they help most, shown by the scripted operator;",
-        if options.no_start_pairs { "no" } else { "2 (open hand, fist)" }
+        "training   {} and {PAIRS} chosen where they help most; a scripted operator shows the hand poses;",
+        if options.no_start_pairs { "no start pairs" } else { "2 start pairs (open hand, fist)" }
     ));
     tell.say(format_args!(
         "           short schedule of {} epochs (the paper's is 8,000 + 100 a pair: `gauntlet train`)",
@@ -134,7 +134,7 @@ fn devices(
     ));
     let (gripper_port, _) = probe::open_gripper(gripper.path(), interrupt)?;
     let parts = Parts {
-        glove: probe::open_glove(glove.path(), interrupt)?,
+        glove: probe::open_glove(glove.path(), interrupt)?.port,
         gripper: gripper_port,
         image,
         config: bridge::Config::default(),

@@ -11,6 +11,7 @@ use crate::cli::{Hand, Teleop};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::platform::Clock;
+use crate::port::BAUD;
 use crate::record::AXES;
 use crate::run::{Options, Run};
 use crate::session::{Order, Parts, Session};
@@ -46,6 +47,12 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         words::activation(status.activation)
     ));
     let glove = probe::open_glove(&options.glove, interrupt)?;
+    if glove.switched {
+        tell.say(format_args!(
+            "glove    {}  spoke 9600 baud, as after power-on; switched it to {BAUD}",
+            options.glove.display()
+        ));
+    }
     let clock = Clock::start();
     let log = options
         .log
@@ -53,7 +60,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         .map(|path| SessionLog::create(path, clock))
         .transpose()?;
     let parts = Parts {
-        glove,
+        glove: glove.port,
         gripper,
         image,
         config,

@@ -86,7 +86,7 @@ impl View {
             format!(" | {}", self.faults.join("; "))
         };
         format!(
-            "{:5.1} s  {:<10} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{fault}",
+            "{:5.1} s  {:<11} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{fault}",
             self.elapsed.as_secs_f64(),
             self.state,
             axes.join("  "),

@@ -1,0 +1,28 @@
+//! The whole demo, shortened: trains, starts both devices, drives one with the other, sums up.
+#![allow(missing_docs)]
+
+mod support;
+
+use support::{json, run};
+
+#[test]
+fn the_demo_trains_and_moves_the_gripper() {
+    let folder = tempfile::tempdir().unwrap();
+    let log = folder.path().join("demo.mcap");
+    let said = json(&run(&[
+        "demo",
+        "--seconds",
+        "3",
+        "--json",
+        "--log",
+        log.to_str().unwrap(),
+    ]));
+    let quality = &said["quality"];
+    assert!(quality["volume_occupancy"].as_f64() >= Some(0.90), "{said}");
+    assert!(quality["d_knn"].as_f64() <= Some(16.0), "{said}");
+    assert!(said["first_motion_s"].as_f64().is_some(), "{said}");
+    assert!(said["run"]["frames_answered"].as_u64() > Some(0), "{said}");
+    assert_eq!(said["pairs"], 10);
+    let bytes = std::fs::read(&log).unwrap();
+    assert!(mcap::Summary::read(&bytes).unwrap().is_some());
+}

@@ -1,0 +1,208 @@
+//! `simulate` and `teleop` against each other, and ports on which nobody answers.
+#![allow(missing_docs)]
+
+mod support;
+
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use std::os::fd::OwnedFd;
+use std::process::Stdio;
+use std::time::Duration;
+use support::{Simulation, command, finish, json, model, refusal, run, signal, text};
+
+/// A terminal with nobody behind it.
+fn silent_port() -> (OwnedFd, String) {
+    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+    grantpt(&master).unwrap();
+    unlockpt(&master).unwrap();
+    let name = ptsname(&master, Vec::new()).unwrap();
+    (master, name.into_string().unwrap())
+}
+
+fn teleop(glove: &str, gripper: &str, more: &[&str]) -> Vec<String> {
+    let mut arguments = vec!["teleop", "--glove", glove, "--gripper", gripper, "--model"];
+    arguments.push(model().to_str().unwrap());
+    arguments.extend(more);
+    arguments.into_iter().map(str::to_owned).collect()
+}
+
+fn run_owned(arguments: &[String]) -> std::process::Output {
+    run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+#[test]
+fn simulate_takes_its_links_away() {
+    let mut simulation = Simulation::start(true, true);
+    assert!(
+        simulation
+            .said
+            .iter()
+            .any(|line| line.contains("115200 baud"))
+    );
+    assert!(std::path::Path::new(&simulation.glove()).exists());
+    assert_eq!(simulation.end(), Some(0));
+    assert!(std::fs::symlink_metadata(simulation.glove()).is_err());
+    assert!(std::fs::symlink_metadata(simulation.gripper()).is_err());
+}
+
+#[test]
+fn simulate_makes_either_device_alone() {
+    let mut glove = Simulation::start(true, false);
+    let mut gripper = Simulation::start(false, true);
+    assert_eq!((glove.end(), gripper.end()), (Some(0), Some(0)));
+}
+
+#[test]
+fn simulate_refuses_a_path_that_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("poses.csv");
+    std::fs::write(&path, "precious").unwrap();
+    let output = run(&["simulate", "--gripper", path.to_str().unwrap()]);
+    assert!(refusal(&output, 1).contains("poses.csv"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "precious");
+}
+
+#[test]
+fn teleop_drives_the_simulated_gripper_and_logs_it() {
+    let mut simulation = Simulation::start(true, true);
+    let log = simulation.folder.path().join("run.mcap");
+    let said = json(&run_owned(&teleop(
+        &simulation.glove(),
+        &simulation.gripper(),
+        &[
+            "--engage",
+            "--activate",
+            "--seconds",
+            "3",
+            "--json",
+            "--log",
+            log.to_str().unwrap(),
+        ],
+    )));
+    let run = &said["run"];
+    assert!(run["glove_frames"].as_u64() > Some(10), "{said}");
+    assert!(run["gripper_cycles"].as_u64() > Some(30), "{said}");
+    assert!(run["commands"].as_u64() > Some(0), "{said}");
+    let bytes = std::fs::read(&log).unwrap();
+    let summary = mcap::Summary::read(&bytes)
+        .unwrap()
+        .expect("the log has its index");
+    assert_eq!(summary.channels.len(), 6);
+    let counts = summary.stats.unwrap().channel_message_counts;
+    assert_eq!(counts.len(), 6, "every channel has messages: {counts:?}");
+    assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn nothing_moves_without_the_clutch() {
+    let mut simulation = Simulation::start(true, true);
+    let said = json(&run_owned(&teleop(
+        &simulation.glove(),
+        &simulation.gripper(),
+        &["--seconds", "1.5", "--json"],
+    )));
+    assert_eq!(said["run"]["commands"], 0, "{said}");
+    assert_eq!(said["run"]["frames_following"], 0, "{said}");
+    assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn engaging_a_gripper_that_is_not_activated_is_refused_with_the_way_out() {
+    let mut simulation = Simulation::start(true, true);
+    let output = run_owned(&teleop(
+        &simulation.glove(),
+        &simulation.gripper(),
+        &["--engage", "--seconds", "2"],
+    ));
+    assert!(refusal(&output, 1).contains("not activated"));
+    assert!(text(&output.stderr).contains("--activate"));
+    assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn ctrl_c_while_driving_holds_and_finishes_the_log() {
+    let mut simulation = Simulation::start(true, true);
+    let log = simulation.folder.path().join("run.mcap");
+    let arguments = teleop(
+        &simulation.glove(),
+        &simulation.gripper(),
+        &["--engage", "--activate", "--log", log.to_str().unwrap()],
+    );
+    let child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(6));
+    signal(&child, "INT");
+    let output = finish(child);
+    let said = text(&output.stdout);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{said} {}",
+        text(&output.stderr)
+    );
+    assert!(said.contains("the gripper is held where it is"), "{said}");
+    let bytes = std::fs::read(&log).unwrap();
+    let commands: Vec<serde_json::Value> = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap)
+        .filter(|message| message.channel.topic == "/gripper/command")
+        .map(|message| serde_json::from_slice(&message.data).unwrap())
+        .collect();
+    let last = commands.last().expect("something was commanded");
+    assert!(
+        last["age_us"].is_null(),
+        "the last command is no hold: {last}"
+    );
+    assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn a_port_that_does_not_exist_is_named() {
+    let output = run_owned(&teleop("/dev/ttyUSB_none", "/dev/ttyUSB_none2", &[]));
+    let error = refusal(&output, 1);
+    assert!(
+        error.contains("/dev/ttyUSB_none") && error.contains("does not exist"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_port_where_no_gripper_answers_is_named_with_its_baud() {
+    let (_master, port) = silent_port();
+    let output = run_owned(&teleop("/dev/null", &port, &[]));
+    let error = refusal(&output, 1);
+    assert!(
+        error.contains("gripper") && error.contains(&port) && error.contains("115200"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_port_where_no_glove_answers_is_named_with_its_bauds() {
+    let mut simulation = Simulation::start(false, true);
+    let (_master, port) = silent_port();
+    let output = run_owned(&teleop(&port, &simulation.gripper(), &[]));
+    let error = refusal(&output, 1);
+    assert!(
+        error.contains("glove") && error.contains(&port) && error.contains("9600"),
+        "{error}"
+    );
+    assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn swapped_ports_are_told() {
+    let mut simulation = Simulation::start(true, true);
+    let output = run_owned(&teleop(&simulation.gripper(), &simulation.glove(), &[]));
+    refusal(&output, 1);
+    assert!(
+        text(&output.stderr).contains("port"),
+        "{}",
+        text(&output.stderr)
+    );
+    let output = run_owned(&teleop(&simulation.glove(), &simulation.glove(), &[]));
+    assert!(refusal(&output, 2).contains("same port"));
+    assert_eq!(simulation.end(), Some(0));
+}

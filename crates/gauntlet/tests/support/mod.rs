@@ -1,0 +1,211 @@
+//! Runs the tool as a person does, with deadlines.
+#![allow(dead_code, missing_docs)]
+
+use std::io::{BufRead, BufReader, Read};
+use std::path::{Path, PathBuf};
+use std::process::{Child, ChildStdout, Command, Output, Stdio};
+use std::sync::OnceLock;
+use std::time::{Duration, Instant};
+
+/// No command of these tests may take longer, on a busy machine too.
+const DEADLINE: Duration = Duration::from_secs(300);
+
+pub fn command(arguments: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_gauntlet"));
+    command.args(arguments).stdin(Stdio::null());
+    command
+}
+
+/// Runs to the end.
+pub fn run(arguments: &[&str]) -> Output {
+    let child = command(arguments)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    finish(child)
+}
+
+/// Collects what a child says until it ends.
+pub fn finish(mut child: Child) -> Output {
+    let mut stdout = child.stdout.take().unwrap();
+    let mut stderr = child.stderr.take().unwrap();
+    let out = std::thread::spawn(move || drain(&mut stdout));
+    let err = std::thread::spawn(move || drain(&mut stderr));
+    let status = wait(&mut child);
+    Output {
+        status,
+        stdout: out.join().unwrap(),
+        stderr: err.join().unwrap(),
+    }
+}
+
+fn drain(from: &mut impl Read) -> Vec<u8> {
+    let mut bytes = Vec::new();
+    from.read_to_end(&mut bytes).unwrap();
+    bytes
+}
+
+pub fn wait(child: &mut Child) -> std::process::ExitStatus {
+    let end = Instant::now() + DEADLINE;
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status;
+        }
+        if Instant::now() > end {
+            child.kill().unwrap();
+            panic!("the command did not end in {DEADLINE:?}");
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// A signal by its name, as `kill` takes it.
+pub fn signal(child: &Child, name: &str) {
+    let done = Command::new("kill")
+        .args(["-s", name, &child.id().to_string()])
+        .status()
+        .unwrap();
+    assert!(done.success());
+}
+
+pub fn text(bytes: &[u8]) -> String {
+    String::from_utf8_lossy(bytes).into_owned()
+}
+
+pub fn json(output: &Output) -> serde_json::Value {
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    serde_json::from_slice(&output.stdout).expect("standard output is JSON and nothing else")
+}
+
+/// The one line that says what is wrong, after checking its form, the next step and the exit code.
+pub fn refusal(output: &Output, code: i32) -> String {
+    let stderr = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{stderr}");
+    let errors: Vec<&str> = stderr
+        .lines()
+        .filter(|l| l.starts_with("error: "))
+        .collect();
+    assert_eq!(errors.len(), 1, "{stderr}");
+    assert!(stderr.contains("\n  try: "), "no next step in: {stderr}");
+    assert!(!stderr.contains("panicked"), "{stderr}");
+    errors[0].to_owned()
+}
+
+/// Joint names as files carry them, in order.
+pub const JOINTS: [&str; 25] = glove::hand::JOINT_NAMES;
+
+/// A poses file of `rows` rows from the generator, and the same with a change.
+pub fn poses_file(folder: &Path, rows: usize) -> PathBuf {
+    let path = folder.join("poses.csv");
+    std::fs::write(&path, poses_text(rows)).unwrap();
+    path
+}
+
+pub fn poses_text(rows: usize) -> String {
+    let frames = trainer::motion::Generator::new(&glove::hand::LIMITS, 5).frames(rows, 9.2);
+    let mut text = format!("time_s,{}\n", JOINTS.join(","));
+    for (index, row) in frames.iter_rows().enumerate() {
+        let values: Vec<String> = row.iter().map(f32::to_string).collect();
+        text.push_str(&format!("{:.4},{}\n", index as f64 / 9.2, values.join(",")));
+    }
+    text
+}
+
+/// A model trained in a few epochs: good enough to move something.
+pub fn model() -> &'static Path {
+    static MODEL: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
+    &MODEL
+        .get_or_init(|| {
+            let folder = tempfile::tempdir().unwrap();
+            let poses = poses_file(folder.path(), 200);
+            let model = folder.path().join("model.safetensors");
+            let output = run(&[
+                "train",
+                "--poses",
+                poses.to_str().unwrap(),
+                "--out",
+                model.to_str().unwrap(),
+                "--schedule",
+                "short",
+                "--epochs",
+                "30",
+                "--pairs",
+                "1",
+            ]);
+            assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+            (folder, model)
+        })
+        .1
+}
+
+/// A running `simulate`, ended with the test.
+pub struct Simulation {
+    pub folder: tempfile::TempDir,
+    pub child: Child,
+    pub said: Vec<String>,
+}
+
+impl Simulation {
+    /// Starts it and waits for `ready`.
+    pub fn start(glove: bool, gripper: bool) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let paths = (folder.path().join("glove"), folder.path().join("gripper"));
+        let mut arguments = vec!["simulate"];
+        if glove {
+            arguments.extend(["--glove", paths.0.to_str().unwrap()]);
+        }
+        if gripper {
+            arguments.extend(["--gripper", paths.1.to_str().unwrap()]);
+        }
+        let mut child = command(&arguments)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit())
+            .spawn()
+            .unwrap();
+        let said = until_ready(child.stdout.take().unwrap());
+        Self {
+            folder,
+            child,
+            said,
+        }
+    }
+
+    pub fn glove(&self) -> String {
+        self.path("glove")
+    }
+
+    pub fn gripper(&self) -> String {
+        self.path("gripper")
+    }
+
+    fn path(&self, name: &str) -> String {
+        self.folder.path().join(name).to_str().unwrap().to_owned()
+    }
+
+    /// Ends it in order; returns its exit code.
+    pub fn end(&mut self) -> Option<i32> {
+        signal(&self.child, "INT");
+        wait(&mut self.child).code()
+    }
+}
+
+impl Drop for Simulation {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+fn until_ready(stdout: ChildStdout) -> Vec<String> {
+    let mut said = Vec::new();
+    for line in BufReader::new(stdout).lines() {
+        let line = line.unwrap();
+        let ready = line == "ready";
+        said.push(line);
+        if ready {
+            return said;
+        }
+    }
+    panic!("simulate ended before it was ready: {said:?}");
+}

@@ -1,0 +1,191 @@
+//! Wrong files and wrong words: one clear line, a next step, exit code 1 or 2.
+#![allow(missing_docs)]
+
+mod support;
+
+use std::path::Path;
+use support::{JOINTS, model, poses_file, poses_text, refusal, run, text};
+
+fn path(path: &Path) -> &str {
+    path.to_str().unwrap()
+}
+
+/// Trains on a file with this content and returns the refusal.
+fn train_refusal(content: &str) -> String {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = folder.path().join("poses.csv");
+    std::fs::write(&poses, content).unwrap();
+    let out = folder.path().join("model.safetensors");
+    let output = run(&[
+        "train",
+        "--poses",
+        path(&poses),
+        "--out",
+        path(&out),
+        "--epochs",
+        "5",
+    ]);
+    assert!(!out.exists(), "a model was written from a wrong file");
+    let error = refusal(&output, 1);
+    assert!(
+        error.contains("poses.csv"),
+        "the file is not named: {error}"
+    );
+    error
+}
+
+#[test]
+fn a_missing_column_is_named() {
+    let error = train_refusal(&poses_text(60).replace("ring_pip_flex", "ring_pip"));
+    assert!(error.contains("ring_pip_flex"), "{error}");
+}
+
+#[test]
+fn a_nan_is_named_by_row_and_column() {
+    let mut lines: Vec<String> = poses_text(60).lines().map(str::to_owned).collect();
+    let mut fields: Vec<&str> = lines[7].split(',').collect();
+    fields[1 + 6] = "NaN";
+    lines[7] = fields.join(",");
+    let error = train_refusal(&lines.join("\n"));
+    assert!(
+        error.contains("row 7") && error.contains(JOINTS[6]),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_word_among_the_numbers_is_named_by_row_and_column() {
+    let error = train_refusal(&poses_text(60).replacen("0.0000,", "zero,", 1));
+    assert!(
+        error.contains("row 1") && error.contains("time_s"),
+        "{error}"
+    );
+}
+
+#[test]
+fn too_few_rows_are_counted() {
+    let error = train_refusal(&poses_text(12));
+    assert!(error.contains("12"), "{error}");
+    train_refusal("");
+}
+
+#[test]
+fn a_file_that_is_not_there_is_named() {
+    let output = run(&[
+        "train",
+        "--poses",
+        "/nowhere/hand.csv",
+        "--out",
+        "/tmp/never.safetensors",
+    ]);
+    assert!(refusal(&output, 1).contains("/nowhere/hand.csv"));
+}
+
+#[test]
+fn a_model_that_cannot_be_written_is_refused_before_training() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let output = run(&[
+        "train",
+        "--poses",
+        path(&poses),
+        "--out",
+        "/nowhere/m.safetensors",
+    ]);
+    assert!(refusal(&output, 2).contains("/nowhere/m.safetensors"));
+}
+
+#[test]
+fn a_file_that_is_no_model_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let output = run(&["eval", "--model", path(&poses), "--poses", path(&poses)]);
+    let error = refusal(&output, 1);
+    assert!(error.contains("not a safetensors file"), "{error}");
+}
+
+#[test]
+fn a_model_of_another_shape_is_refused_with_both_shapes() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let other = folder.path().join("other.safetensors");
+    let network = |inputs: usize, hidden: usize, outputs: usize| trainer::network::Network {
+        inputs,
+        hidden,
+        outputs,
+        w1: vec![0.1; inputs * hidden],
+        b1: vec![0.0; hidden],
+        w2: vec![0.1; hidden * outputs],
+        b2: vec![0.0; outputs],
+    };
+    let save = |inputs, hidden, outputs| {
+        trainer::model::Model {
+            f: network(inputs, hidden, outputs),
+            g: network(outputs, hidden, inputs),
+            q: trainer::model::Normalisation::identity(inputs),
+            x: trainer::model::Normalisation::identity(outputs),
+            metadata: Default::default(),
+        }
+        .save(&other)
+        .unwrap();
+        let output = run(&["eval", "--model", path(&other), "--poses", path(&poses)]);
+        refusal(&output, 1)
+    };
+    let error = save(2, 300, 2);
+    assert!(
+        error.contains("2 values to 2") && error.contains("25 to 4"),
+        "{error}"
+    );
+    let error = save(25, 64, 4);
+    assert!(error.contains("64") && error.contains("300"), "{error}");
+}
+
+#[test]
+fn a_damaged_model_is_refused_with_its_tensor() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let damaged = folder.path().join("damaged.safetensors");
+    let mut bytes = std::fs::read(model()).unwrap();
+    let end = bytes.len();
+    bytes[end - 4..].copy_from_slice(&f32::NAN.to_le_bytes());
+    std::fs::write(&damaged, &bytes).unwrap();
+    let output = run(&["eval", "--model", path(&damaged), "--poses", path(&poses)]);
+    let error = refusal(&output, 1);
+    assert!(error.contains("NaN"), "{error}");
+    std::fs::write(&damaged, &bytes[..end / 2]).unwrap();
+    let output = run(&["eval", "--model", path(&damaged), "--poses", path(&poses)]);
+    refusal(&output, 1);
+}
+
+#[test]
+fn wrong_words_are_usage_errors() {
+    for arguments in [
+        &["fly"][..],
+        &["demo", "--seconds", "0"],
+        &["train", "--poses", "a.csv"],
+        &["simulate"],
+        &["teleop", "--glove", "/tmp/a"],
+    ] {
+        let output = run(arguments);
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{arguments:?}: {}",
+            text(&output.stderr)
+        );
+        assert!(text(&output.stderr).contains("error: "), "{arguments:?}");
+    }
+}
+
+#[test]
+fn help_of_every_verb_shows_an_example() {
+    for verb in ["demo", "train", "eval", "simulate", "teleop", "ports"] {
+        let output = run(&[verb, "--help"]);
+        assert_eq!(output.status.code(), Some(0));
+        let help = text(&output.stdout);
+        assert!(
+            help.contains("Examples:") && help.contains(&format!("gauntlet {verb}")),
+            "{help}"
+        );
+    }
+}
