@@ -89,6 +89,8 @@ struct Hand {
     world: UnitQuaternion<f32>,
     mounting: [UnitQuaternion<f32>; 16],
     dither: Option<u64>,
+    /// Turn of each sensor's world about the vertical.
+    heading: [UnitQuaternion<f32>; 16],
 }
 
 fn unit([w, x, y, z]: [f32; 4]) -> UnitQuaternion<f32> {
@@ -101,7 +103,7 @@ impl Hand {
     fn orientation(&mut self, index: usize, at: Instant) -> [f32; 4] {
         let angles = self.pose.pose_at(at.as_ticks() as f64 * 1e-6);
         let segments = ::glove::hand::segment_orientations(&angles, self.side);
-        let q = self.world * segments[index] * self.mounting[index];
+        let q = self.heading[index] * self.world * segments[index] * self.mounting[index];
         let mut components = [q.w, q.i, q.j, q.k];
         if let Some(seed) = self.dither {
             let stream = (at.as_ticks() << 4) | index as u64;
@@ -125,6 +127,7 @@ impl VirtualGlove {
             world: unit(config.world),
             mounting: config.mounting.map(unit),
             dither: config.dither,
+            heading: [UnitQuaternion::identity(); 16],
         };
         let state = State {
             bridge: Sc18im::new(config.chip, config.baud, config.power_on),

@@ -544,6 +544,10 @@ fn mounting_turns_what_a_sensor_reports() {
     bench.start_fusion(0x28);
     // Rz(90) Ry(90) = (1/2)(1, -1, 1, 1).
     assert_eq!(bench.quaternion(0x28), [8_192, -8_192, 8_192, 8_192]);
+    // A heading of -90 degrees takes the world's turn away: Ry(90) is left.
+    bench.glove.set_heading(0, -core::f32::consts::FRAC_PI_2);
+    bench.wait_ms(10);
+    assert_eq!(bench.quaternion(0x28), [11_585, 0, 11_585, 0]);
 }
 
 #[test]

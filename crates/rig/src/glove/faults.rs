@@ -81,6 +81,15 @@ impl VirtualGlove {
         lock(&self.state).bridge.short_answers = (bytes, count);
     }
 
+    /// Turns the world of sensor `index` by `radians` about the vertical: in IMU mode there is no compass,
+    /// and a sensor that starts anew takes its heading of that moment for its own.
+    pub fn set_heading(&self, index: usize, radians: f32) {
+        let axis = nalgebra::Vector3::z_axis();
+        if let Some(heading) = lock(&self.state).hand.heading.get_mut(index) {
+            *heading = nalgebra::UnitQuaternion::from_axis_angle(&axis, radians);
+        }
+    }
+
     /// Puts another source of poses in place.
     pub fn set_pose(&self, pose: Box<dyn PoseSource>) {
         lock(&self.state).hand.pose = pose;
