@@ -3,7 +3,7 @@
 use core::fmt;
 
 use crate::image::{self, Checked, Element, Error, HEADER_LEN, JointOrder};
-use crate::kernel::{IntegerWeights, Kernel, Weights};
+use crate::kernel::{IntegerWeights, Kernel, Weights, all_in_range};
 
 /// Largest magnitude of an input: 2π rad (as f32, 6.2831855).
 pub const INPUT_LIMIT: f32 = core::f32::consts::TAU;
@@ -231,17 +231,6 @@ impl fmt::Display for RepackError {
 }
 
 impl core::error::Error for RepackError {}
-
-/// True if every input is an angle within ±2π. Without branches: for finite and non-finite values alike, the magnitudes
-/// are in the order of their bits.
-#[inline]
-fn all_in_range(q: &[f32]) -> bool {
-    let limit = INPUT_LIMIT.to_bits();
-    let beyond = q.iter().fold(0, |beyond, q| {
-        beyond | limit.wrapping_sub(q.to_bits() & 0x7fff_ffff)
-    });
-    beyond & 0x8000_0000 == 0
-}
 
 #[cold]
 fn first_out_of_range(q: &[f32]) -> InputError {

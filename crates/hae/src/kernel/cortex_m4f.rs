@@ -17,10 +17,12 @@ pub(super) const UNITS: usize = 19;
 /// Inputs that the 16-bit code is written for.
 pub(super) const I16_INPUTS: usize = 25;
 
+global_asm!(include_str!("cortex_m4f_check.s"), options(raw));
 global_asm!(include_str!("cortex_m4f.s"), options(raw));
 global_asm!(include_str!("cortex_m4f_i16.s"), options(raw));
 
 unsafe extern "C" {
+    fn hae_m4f_beyond(q: *const f32, inputs: usize) -> u32;
     fn hae_m4f_i16(
         tiles: *const u32,
         q: *const f32,
@@ -37,6 +39,13 @@ unsafe extern "C" {
         inputs: usize,
         outputs: usize,
     );
+}
+
+/// True if every magnitude, as bits, is at most that of 2π.
+#[inline]
+pub(super) fn all_in_range(q: &[f32]) -> bool {
+    // SAFETY: the code reads the values of `q` and keeps to the procedure call standard.
+    unsafe { hae_m4f_beyond(q.as_ptr(), q.len()) & 0x8000_0000 == 0 }
 }
 
 /// f(q) on lane-major weights with 19 units in a lane.

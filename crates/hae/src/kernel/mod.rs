@@ -16,6 +16,8 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
+#[cfg(not(cortex_m4f))]
+use crate::INPUT_LIMIT;
 use crate::image::{lane_words, record_words};
 use crate::quantized::Layout;
 use crate::{LANES, units_per_lane};
@@ -199,6 +201,22 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Weights<'w, Q, H, X> {
                 _ => portable::eval::<Q, H, X>(self.words, q),
             }
         }
+    }
+}
+
+/// True if every input is an angle within ±2π. Without branches: for finite and non-finite values alike, the magnitudes
+/// are in the order of their bits.
+#[inline]
+pub(crate) fn all_in_range(q: &[f32]) -> bool {
+    #[cfg(cortex_m4f)]
+    return cortex_m4f::all_in_range(q);
+    #[cfg(not(cortex_m4f))]
+    {
+        let limit = INPUT_LIMIT.to_bits();
+        let beyond = q.iter().fold(0, |beyond, q| {
+            beyond | limit.wrapping_sub(q.to_bits() & 0x7fff_ffff)
+        });
+        beyond & 0x8000_0000 == 0
     }
 }
 

@@ -152,8 +152,27 @@ fn shape<const Q: usize, const H: usize, const X: usize>(samples: usize) {
     });
     let _ = writeln!(Console, "count i16 {Q}x{H}x{X} parse {parse}");
     let map = Map::<Q, H, X>::from_image(bytes).expect("a sound image");
+    refuses(&map);
     measure("i16", &map, seed, samples);
     measure("i16", &map.portable().expect("an image in place"), seed, samples);
+}
+
+/// Every input that is not an angle within ±2π is refused by name, all others are taken.
+fn refuses<const Q: usize, const H: usize, const X: usize>(map: &Map<'_, Q, H, X>) {
+    let limit = hae::INPUT_LIMIT;
+    for input in 0..Q {
+        for value in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, limit.next_up(), -limit.next_up()] {
+            let mut q = [0.5; Q];
+            q[input] = value;
+            let error = map.eval(black_box(&q)).expect_err("a refusal");
+            assert_eq!((error.input, error.value.to_bits()), (input, value.to_bits()));
+        }
+        for value in [limit, -limit, 0.0, -0.0, 1e-45] {
+            let mut q = [-0.5; Q];
+            q[input] = value;
+            assert!(map.eval(black_box(&q)).is_ok());
+        }
+    }
 }
 
 fn measure<const Q: usize, const H: usize, const X: usize>(
