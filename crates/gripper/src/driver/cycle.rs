@@ -116,8 +116,8 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             .decode(block, now, self.config.check_reserved)
             .and_then(|snapshot| {
                 if self.running.is_some() {
-                    // A task writes blocks of its own: any echo may come.
-                    self.echo.forget();
+                    self.echo.take(snapshot.echo);
+                    return Ok(snapshot);
                 }
                 if self.echo.believes(snapshot.echo) {
                     Ok(snapshot)
@@ -220,7 +220,10 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 return Some(doing);
             }
         }
-        self.first_free(F::READS.iter().map(read), now)
+        // Short reads only where every whole one is owed: they are a sign of life, no status.
+        let whole = |&&(_, quantity): &&(u8, u16)| quantity >= F::WHOLE;
+        self.first_free(F::READS.iter().filter(whole).map(read), now)
+            .or_else(|| self.first_free(F::READS.iter().map(read), now))
     }
 
     /// The first of `looks` that no late reply can answer; else the one whose settled debt ends

@@ -31,9 +31,10 @@ impl<const X: usize> EchoWatch<X> {
         }
     }
 
-    /// Anything may be echoed next: the command block was written otherwise.
-    pub(super) fn forget(&mut self) {
-        *self = Self::default();
+    /// Takes `echo` as it is: while a task runs the gripper writes over its own registers.
+    pub(super) fn take(&mut self, echo: [u8; X]) {
+        self.known = Some(echo);
+        self.doubted = None;
     }
 
     /// Whether to believe `echo`. An unexpected one is doubted once and believed the second time in

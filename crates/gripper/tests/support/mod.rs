@@ -1,6 +1,8 @@
 //! A line under the test's control: what is written lands in a log, what is to be read has a time.
 //! Time is virtual; [`run`] moves it from one event to the next.
-#![allow(dead_code)]
+#![allow(dead_code, clippy::unwrap_used)]
+
+pub mod fuzz;
 
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use gripper::link::Link;
