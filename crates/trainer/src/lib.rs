@@ -21,5 +21,7 @@ pub mod operator;
 pub mod optimizer;
 pub(crate) mod pool;
 pub(crate) mod random;
+pub mod reproduce;
 pub mod shapes;
+pub mod table3;
 pub(crate) mod whole_file;

@@ -1,0 +1,355 @@
+//! Makes the samples of a cell, trains, measures.
+
+use super::{Cell, Error, Row, Source};
+use crate::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
+use crate::cost::Lambda;
+use crate::data::{self, Matrix, Pairs};
+use crate::measures::{Coverage, Measures, Test, measure};
+use crate::model::{Metadata, Model, Normalisation};
+use crate::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
+use crate::network::Network;
+use crate::operator::{GroundTruth, Operator, Scripted};
+use crate::random::Random;
+use crate::shapes::{Domains, ShapePair, Singular};
+use crate::table3;
+use core::ops::ControlFlow;
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// Target samples of every experiment (§3.2.1, §3.3.2).
+const TARGETS: usize = 8000;
+/// Random numbers of the gripper's samples.
+const TARGET_STREAM: u64 = 0x4752_4950;
+
+/// Everything that cells share: joint limits, the recording if any, the shapes with their truth (made once, when first needed).
+#[derive(Debug)]
+pub struct Laboratory {
+    limits: [(f32, f32); COUNT],
+    recording: Option<Matrix>,
+    shapes: [OnceLock<Domains>; 4],
+}
+
+/// The samples of a cell, in network units, and what to do with them.
+pub struct Prepared {
+    /// Input samples to train on.
+    pub train: Matrix,
+    /// Input samples held out.
+    pub test: Matrix,
+    /// Target samples.
+    pub targets: Matrix,
+    /// Pairs of held-out inputs and their true targets.
+    pub truth: Option<Pairs>,
+    /// For the volume occupancy.
+    pub coverage: Coverage,
+    /// Normalisation of input and target.
+    pub units: (Normalisation, Normalisation),
+    /// Who answers for adaptive pairs, in the domains' units.
+    pub operator: Box<dyn Operator + Send>,
+    /// Of the training.
+    pub settings: Settings,
+}
+
+/// What came of a cell.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// The measures on held-out samples.
+    pub measures: Measures,
+    /// Epoch and measures on the way, when the cell asked for them.
+    pub trace: Vec<(usize, Measures)>,
+    /// The reference pairs, in the domains' units.
+    pub pairs: Pairs,
+    /// The trained model with its metadata.
+    pub model: Model,
+    /// Seconds of training, without the measures.
+    pub seconds: f64,
+}
+
+impl Laboratory {
+    /// With the joint limits of a hand (radians) and perhaps a recording of one (radians, a frame a row).
+    #[must_use]
+    pub fn new(limits: &[(f32, f32); COUNT], recording: Option<Matrix>) -> Self {
+        Self {
+            limits: *limits,
+            recording,
+            shapes: Default::default(),
+        }
+    }
+
+    /// Nodes, truth and matched outline of a pair of shapes.
+    ///
+    /// # Errors
+    /// [`Singular`], which no pair gives.
+    pub fn shape(&self, pair: ShapePair) -> Result<&Domains, Singular> {
+        let place = &self.shapes[pair as usize];
+        if place.get().is_none() {
+            // Two threads may both build it; the results are equal.
+            let _ = place.set(pair.build()?);
+        }
+        place.get().ok_or(Singular)
+    }
+
+    /// The samples and settings of a cell.
+    ///
+    /// # Errors
+    /// [`Error`], before any training.
+    pub fn prepare(&self, cell: &Cell) -> Result<Prepared, Error> {
+        match cell.source {
+            Source::Shape(pair) => self.prepare_shape(cell, pair),
+            Source::Generated => {
+                let frames = Generator::new(&self.limits, cell.seed).frames(FRAMES, RATE_HZ);
+                prepare_hand(cell, &frames, Scripted::new(&self.limits))
+            }
+            Source::Recorded => {
+                let frames = self.recording.as_ref().ok_or(Error::NoRecording)?;
+                prepare_hand(cell, frames, Scripted::for_recording(frames)?)
+            }
+        }
+    }
+
+    fn prepare_shape(&self, cell: &Cell, pair: ShapePair) -> Result<Prepared, Error> {
+        let domains = self.shape(pair)?;
+        let split = data::split(domains.truth.inputs.rows, 0.5, cell.seed);
+        let part = |pairs: &Pairs, indices: &[usize]| Pairs {
+            inputs: pairs.inputs.select(indices),
+            targets: pairs.targets.select(indices),
+        };
+        let held_out = part(&domains.truth, &split.test);
+        let plan = match cell.row {
+            Row::HaeAdaptive => PairPlan::Adaptive {
+                start: Pairs::default(),
+                count: cell.pairs,
+            },
+            Row::HaeFixed => {
+                let matched = domains.boundary.inputs.rows;
+                let places: Vec<usize> = (1..=cell.pairs)
+                    .map(|i| (2 * i * matched + cell.pairs) / (2 * cell.pairs) % matched)
+                    .collect();
+                PairPlan::Fixed(part(&domains.boundary, &places))
+            }
+            // The split is in random order: its first L training samples are the same for every cost.
+            _ => {
+                let first = cell.pairs.min(split.train.len());
+                PairPlan::Fixed(part(&domains.truth, &split.train[..first]))
+            }
+        };
+        let units = (
+            Normalisation::identity(domains.truth.inputs.cols),
+            Normalisation::identity(domains.truth.targets.cols),
+        );
+        Ok(Prepared {
+            train: domains.truth.inputs.select(&split.train),
+            test: held_out.inputs.clone(),
+            targets: pair.sample_targets(TARGETS, cell.seed),
+            truth: Some(held_out),
+            coverage: Coverage::Volume {
+                volume: domains.target_volume,
+                dimension: domains.target_dimension as u32,
+            },
+            units,
+            operator: Box::new(GroundTruth::new(domains.truth.clone())?),
+            settings: settings(cell, plan, Lambda::SHAPES),
+        })
+    }
+
+    /// Trains and measures a cell. `stop` is asked some times a second.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn run(&self, cell: &Cell, stop: &dyn Fn() -> bool) -> Result<Outcome, Error> {
+        let mut prepared = self.prepare(cell)?;
+        let fail = |source| match source {
+            algorithm::Error::Stopped { .. } => Error::Stopped,
+            source => Error::Training {
+                cell: cell.slug(),
+                source,
+            },
+        };
+        let mut trainer =
+            Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
+        let mut trace = Vec::new();
+        let mut seconds = 0.0;
+        loop {
+            let start = Instant::now();
+            let pause = pause_after(cell.trace_every, trainer.epoch());
+            let step = train_until(&mut trainer, &mut prepared, pause, stop);
+            seconds += start.elapsed().as_secs_f64();
+            let done = match step {
+                Ok(()) => true,
+                Err(algorithm::Error::Stopped { epoch }) if Some(epoch) == pause => false,
+                Err(error) => return Err(fail(error)),
+            };
+            if cell.trace_every > 0 {
+                let now = prepared.measure(&trainer.networks().f);
+                trace.push((trainer.epoch(), now));
+            }
+            if done {
+                break;
+            }
+        }
+        Ok(outcome(cell, &prepared, &trainer, trace, seconds))
+    }
+}
+
+/// The next epoch at which to measure on the way.
+fn pause_after(every: usize, epoch: usize) -> Option<usize> {
+    (every > 0).then(|| (epoch / every + 1) * every)
+}
+
+/// Trains to the end, or to `pause`, which shows as [`algorithm::Error::Stopped`] at that epoch.
+fn train_until(
+    trainer: &mut Trainer,
+    prepared: &mut Prepared,
+    pause: Option<usize>,
+    stop: &dyn Fn() -> bool,
+) -> Result<(), algorithm::Error> {
+    let mut operator = InUnits {
+        operator: prepared.operator.as_mut(),
+        input: &prepared.units.0,
+        target: &prepared.units.1,
+    };
+    let total = trainer.total();
+    let trained = trainer.run(&mut operator, &mut |progress| {
+        let pauses = Some(progress.epoch) == pause && progress.epoch < total;
+        if pauses || stop() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    trained.map(|_| ())
+}
+
+fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<Prepared, Error> {
+    let split = data::split(frames.rows, 0.6, cell.seed);
+    let units = (Normalisation::identity(COUNT), Normalisation::gripper(4));
+    let plan = match cell.row {
+        Row::HaeAdaptive => PairPlan::Adaptive {
+            start: Pairs::default(),
+            count: cell.pairs,
+        },
+        Row::HaeFixed => return Err(Error::NoOutline(cell.slug())),
+        _ => {
+            let shown = table3::pairs(&mut operator, cell.pairs)?;
+            PairPlan::Fixed(Pairs {
+                inputs: units.0.apply_all(&shown.inputs),
+                targets: units.1.apply_all(&shown.targets),
+            })
+        }
+    };
+    Ok(Prepared {
+        train: frames.select(&split.train),
+        test: frames.select(&split.test),
+        targets: units.1.apply_all(&gripper_samples(TARGETS, cell.seed)),
+        truth: None,
+        coverage: Coverage::GRIPPER,
+        units,
+        operator: Box::new(operator),
+        settings: settings(cell, plan, Lambda::HAND),
+    })
+}
+
+/// `count` poses, uniform in the gripper's configuration space, counts.
+#[must_use]
+pub fn gripper_samples(count: usize, seed: u64) -> Matrix {
+    let mut random = Random::new(seed, TARGET_STREAM);
+    let poses: Vec<[f32; 4]> = (0..count)
+        .map(|_| gripper::space::sample(|| random.unit()))
+        .collect();
+    Matrix::from_rows(&poses)
+}
+
+fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
+    Settings {
+        cost: cell.row.cost(),
+        lambda: Lambda {
+            alpha: cell.row.alpha(),
+            ..lambda
+        },
+        schedule: cell.schedule,
+        // Cells run side by side: one thread each.
+        threads: 1,
+        report_every: if cell.trace_every > 0 {
+            cell.trace_every
+        } else {
+            50
+        },
+        ..Settings::shapes(plan, cell.seed)
+    }
+}
+
+impl Prepared {
+    /// The measures of f on the held-out samples.
+    #[must_use]
+    pub fn measure(&self, f: &Network<f32>) -> Measures {
+        let test = Test {
+            inputs: &self.test,
+            targets: &self.targets,
+            coverage: self.coverage,
+            truth: self.truth.as_ref(),
+        };
+        measure(f, &test)
+    }
+}
+
+fn outcome(
+    cell: &Cell,
+    prepared: &Prepared,
+    trainer: &Trainer,
+    trace: Vec<(usize, Measures)>,
+    seconds: f64,
+) -> Outcome {
+    let networks = trainer.networks();
+    let measures = prepared.measure(&networks.f);
+    let invert = |units: &Normalisation, samples: &Matrix| {
+        let mut raw = Matrix::default();
+        for row in samples.iter_rows() {
+            raw.push(&units.invert(row));
+        }
+        raw
+    };
+    let pairs = Pairs {
+        inputs: invert(&prepared.units.0, &trainer.pairs().inputs),
+        targets: invert(&prepared.units.1, &trainer.pairs().targets),
+    };
+    let (q, x) = prepared.units.clone();
+    Outcome {
+        measures,
+        trace,
+        pairs,
+        model: Model {
+            f: networks.f,
+            g: networks.g,
+            q,
+            x,
+            metadata: metadata(cell, prepared, &measures, trainer.epoch()),
+        },
+        seconds,
+    }
+}
+
+fn metadata(cell: &Cell, prepared: &Prepared, measures: &Measures, epochs: usize) -> Metadata {
+    let lambda = prepared.settings.lambda;
+    let mut texts = vec![
+        ("cost", cell.row.cost().name().to_owned()),
+        ("alpha", lambda.alpha.to_string()),
+        (
+            "lambda",
+            format!("{} {} {}", lambda.distortion, lambda.pin, lambda.attraction),
+        ),
+        ("pairs", cell.pairs.to_string()),
+        ("seed", cell.seed.to_string()),
+        ("epochs", epochs.to_string()),
+        (
+            "data_sha256",
+            data::sha256(&[&prepared.train, &prepared.targets]),
+        ),
+        ("dbar", measures.distortion.to_string()),
+        ("dknn", measures.dissimilarity.to_string()),
+    ];
+    texts.extend(measures.occupancy.map(|vo| ("vo", vo.to_string())));
+    texts.extend(measures.nmse.map(|nmse| ("nmse", nmse.to_string())));
+    texts
+        .into_iter()
+        .map(|(key, text)| (key.to_owned(), text))
+        .collect()
+}

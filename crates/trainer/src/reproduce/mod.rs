@@ -1,0 +1,230 @@
+//! The paper's experiments as a list of cells: a data set, a row of Table 1, a number of pairs, a seed and a schedule. A cell is
+//! trained and measured by the [`Laboratory`], kept by the [`Store`], and set beside the paper's numbers by [`paper`] and [`stats`].
+
+mod laboratory;
+pub mod paper;
+pub mod stats;
+mod store;
+
+pub use laboratory::{Laboratory, Outcome, Prepared, gripper_samples};
+pub use store::{Kept, Store, run_all};
+
+use crate::algorithm::Schedule;
+use crate::cost::Cost;
+use crate::shapes::ShapePair;
+
+/// Where the samples come from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Source {
+    /// A pair of synthetic shapes.
+    Shape(ShapePair),
+    /// The hand-motion generator, as many frames as the paper's, seeded with the cell's seed.
+    Generated,
+    /// The recording given to the laboratory.
+    Recorded,
+}
+
+impl Source {
+    /// `sp1` … `sp4`, `generated`, `recorded`.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Shape(ShapePair::Sp1) => "sp1",
+            Self::Shape(ShapePair::Sp2) => "sp2",
+            Self::Shape(ShapePair::Sp3) => "sp3",
+            Self::Shape(ShapePair::Sp4) => "sp4",
+            Self::Generated => "generated",
+            Self::Recorded => "recorded",
+        }
+    }
+}
+
+/// The rows of Tables 2 and 4, and the one more curve of Figures 4 and 5.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Row {
+    /// Pin.
+    Pin,
+    /// CAE + Pin.
+    CaePin,
+    /// Pin + BA.
+    PinBa,
+    /// ‖J‖² + Pin + BA.
+    DistortionPinBa,
+    /// HAE, α = 0.
+    HaeZero,
+    /// HAE, α = 1.
+    HaeOne,
+    /// HAE with adaptive pairs, α = 1.
+    HaeAdaptive,
+    /// HAE, α = 1, with matched points of the outlines at equal distances as pairs: shapes only.
+    HaeFixed,
+}
+
+impl Row {
+    /// The seven rows of the tables, in their order.
+    pub const TABLE: [Self; 7] = [
+        Self::Pin,
+        Self::CaePin,
+        Self::PinBa,
+        Self::DistortionPinBa,
+        Self::HaeZero,
+        Self::HaeOne,
+        Self::HaeAdaptive,
+    ];
+
+    /// As the tables print it.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Pin => "Pin",
+            Self::CaePin => "CAE + Pin",
+            Self::PinBa => "Pin + BA",
+            Self::DistortionPinBa => "‖J‖² + Pin + BA",
+            Self::HaeZero => "HAE (α=0)",
+            Self::HaeOne => "HAE (α=1)",
+            Self::HaeAdaptive => "HAE (adap, α=1)",
+            Self::HaeFixed => "HAE (fixed)",
+        }
+    }
+
+    /// For file names.
+    #[must_use]
+    pub const fn slug(self) -> &'static str {
+        match self {
+            Self::Pin => "pin",
+            Self::CaePin => "cae-pin",
+            Self::PinBa => "pin-ba",
+            Self::DistortionPinBa => "distortion-pin-ba",
+            Self::HaeZero => "hae-0",
+            Self::HaeOne => "hae-1",
+            Self::HaeAdaptive => "hae-adaptive",
+            Self::HaeFixed => "hae-fixed",
+        }
+    }
+
+    /// The cost.
+    #[must_use]
+    pub const fn cost(self) -> Cost {
+        match self {
+            Self::Pin => Cost::Pin,
+            Self::CaePin => Cost::CaePin,
+            Self::PinBa => Cost::PinBa,
+            Self::DistortionPinBa => Cost::DistortionPinBa,
+            Self::HaeZero | Self::HaeOne | Self::HaeAdaptive | Self::HaeFixed => Cost::Hae,
+        }
+    }
+
+    /// α: 0 for all models unless the row says otherwise (§3.2).
+    #[must_use]
+    pub const fn alpha(self) -> f64 {
+        match self {
+            Self::HaeOne | Self::HaeAdaptive | Self::HaeFixed => 1.0,
+            _ => 0.0,
+        }
+    }
+}
+
+/// One training with its measures.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cell {
+    /// The samples.
+    pub source: Source,
+    /// Cost and kind of pairs.
+    pub row: Row,
+    /// L, the number of pairs.
+    pub pairs: usize,
+    /// Split, samples and initial weights follow from it.
+    pub seed: u64,
+    /// Of the training.
+    pub schedule: Schedule,
+    /// Measure also every so many epochs; 0: only at the end.
+    pub trace_every: usize,
+}
+
+impl Cell {
+    /// A cell of Table 2 (four pairs) or Table 4 (eight), with the paper's schedule.
+    #[must_use]
+    pub const fn of_table(source: Source, row: Row, seed: u64) -> Self {
+        let pairs = if matches!(source, Source::Shape(_)) {
+            4
+        } else {
+            8
+        };
+        Self {
+            source,
+            row,
+            pairs,
+            seed,
+            schedule: Schedule::Paper,
+            trace_every: 0,
+        }
+    }
+
+    /// A name that differs between any two cells, fit for a file.
+    #[must_use]
+    pub fn slug(&self) -> String {
+        let schedule = match self.schedule {
+            Schedule::Paper => "paper".to_owned(),
+            Schedule::Fast => "fast".to_owned(),
+            Schedule::Custom(plan) => format!(
+                "{}x{}-{}-{}-{}-{}",
+                plan.stage_epochs,
+                plan.last_epochs,
+                plan.rate.initial,
+                plan.ramp_start,
+                plan.ramp_epochs,
+                plan.batches
+            ),
+        };
+        format!(
+            "{}-{}-l{}-seed{}-{schedule}-every{}",
+            self.source.name(),
+            self.row.slug(),
+            self.pairs,
+            self.seed,
+            self.trace_every
+        )
+    }
+}
+
+/// What can go wrong in a reproduction.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The truth of the shapes.
+    #[error(transparent)]
+    Shapes(#[from] crate::shapes::Singular),
+    /// The operator.
+    #[error(transparent)]
+    Operator(#[from] crate::operator::Error),
+    /// The training.
+    #[error("{cell}: {source}")]
+    Training {
+        /// The cell.
+        cell: String,
+        /// What happened.
+        source: crate::algorithm::Error,
+    },
+    /// The model file of a kept cell.
+    #[error(transparent)]
+    Model(#[from] crate::model::Error),
+    /// The folder of kept cells.
+    #[error("cannot use {}: {source}; check that the folder exists and that you may write there", path.display())]
+    Folder {
+        /// Which file or folder.
+        path: std::path::PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A cell asks for a recording and there is none.
+    #[error("this experiment needs a recording of a hand; give one with --poses")]
+    NoRecording,
+    /// A cell asks for matched outlines of something that has none.
+    #[error("{0}: pairs from the outline are there for the shapes SP1 to SP4 only")]
+    NoOutline(String),
+    /// Asked to stop.
+    #[error("stopped; the cells that are done are kept")]
+    Stopped,
+}
+
+#[cfg(test)]
+mod tests;

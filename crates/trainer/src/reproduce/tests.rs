@@ -1,0 +1,130 @@
+//! Small cells through the laboratory and the store.
+
+use super::*;
+use crate::algorithm::{Plan, Schedule};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A training that takes no time.
+fn short() -> Schedule {
+    Schedule::Custom(Plan {
+        stage_epochs: 3,
+        last_epochs: 6,
+        ramp_start: 1,
+        ramp_epochs: 2,
+        batches: 8,
+        ..Schedule::Paper.plan()
+    })
+}
+
+fn cell(source: Source, row: Row) -> Cell {
+    Cell {
+        pairs: 2,
+        schedule: short(),
+        ..Cell::of_table(source, row, 1)
+    }
+}
+
+fn laboratory() -> Laboratory {
+    Laboratory::new(&glove::hand::LIMITS, None)
+}
+
+#[test]
+fn cells_are_trained_once_and_found_again_whatever_the_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let (laboratory, store) = (laboratory(), Store::open(folder.path(), None).unwrap());
+    let sp2 = Source::Shape(crate::shapes::ShapePair::Sp2);
+    let cells = [
+        cell(sp2, Row::Pin),
+        cell(sp2, Row::HaeAdaptive),
+        cell(sp2, Row::HaeFixed),
+        cell(Source::Generated, Row::HaeZero),
+    ];
+    let heard = AtomicUsize::new(0);
+    let done = |_: &Cell, _: &Kept| {
+        heard.fetch_add(1, Ordering::Relaxed);
+    };
+    let first = run_all((&laboratory, &store), &cells, 2, &done, &|| false).unwrap();
+    assert_eq!(heard.load(Ordering::Relaxed), 4);
+    // Nothing is trained now: a laboratory that may not work finds all.
+    let again = run_all((&laboratory, &store), &cells, 1, &done, &|| true).unwrap();
+    assert_eq!(first, again);
+    let other = tempfile::tempdir().unwrap();
+    let fresh = Store::open(other.path(), None).unwrap();
+    let alone = run_all((&laboratory, &fresh), &cells, 1, &done, &|| false).unwrap();
+    for (a, b) in first.iter().zip(&alone) {
+        assert_eq!((&a.measures, &a.pairs), (&b.measures, &b.pairs));
+    }
+    assert_eq!(first[1].pairs.inputs.rows, 2);
+    assert_eq!(store.model(&cells[3]).unwrap().shape(), [25, 300, 4]);
+    assert!(first[3].measures.nmse.is_none() && first[0].measures.nmse.is_some());
+}
+
+#[test]
+fn a_trace_does_not_change_the_training() {
+    let laboratory = laboratory();
+    let plain = cell(
+        Source::Shape(crate::shapes::ShapePair::Sp2),
+        Row::HaeAdaptive,
+    );
+    let traced = Cell {
+        trace_every: 4,
+        ..plain
+    };
+    let (a, b) = (
+        laboratory.run(&plain, &|| false).unwrap(),
+        laboratory.run(&traced, &|| false).unwrap(),
+    );
+    assert_eq!(a.model, b.model);
+    let epochs: Vec<usize> = b.trace.iter().map(|(epoch, _)| *epoch).collect();
+    assert_eq!(epochs, [4, 8, 12]);
+    assert_eq!(b.trace[2].1, b.measures);
+    assert!(a.trace.is_empty());
+}
+
+#[test]
+fn stopping_keeps_what_is_done_and_damaged_files_count_as_not_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let (laboratory, store) = (laboratory(), Store::open(folder.path(), None).unwrap());
+    let cell = cell(Source::Generated, Row::Pin);
+    let stopped = run_all((&laboratory, &store), &[cell], 2, &|_, _| (), &|| true);
+    assert!(matches!(stopped, Err(Error::Stopped)));
+    assert_eq!(store.find(&cell), None);
+    store.get(&laboratory, &cell, &|| false).unwrap();
+    let json = std::fs::read_dir(folder.path()).unwrap().find_map(|entry| {
+        let path = entry.unwrap().path();
+        (path.extension()? == "json").then_some(path)
+    });
+    std::fs::write(json.unwrap(), "{\"format\":1,").unwrap();
+    assert_eq!(store.find(&cell), None);
+}
+
+#[test]
+fn what_is_not_there_is_said() {
+    let laboratory = laboratory();
+    let recorded = laboratory.prepare(&cell(Source::Recorded, Row::Pin));
+    assert!(matches!(recorded, Err(Error::NoRecording)));
+    let outline = laboratory.prepare(&cell(Source::Generated, Row::HaeFixed));
+    assert!(matches!(outline, Err(Error::NoOutline(_))));
+}
+
+#[test]
+fn all_costs_of_a_table_get_the_same_pairs_samples_and_split() {
+    let laboratory = laboratory();
+    let sp1 = Source::Shape(crate::shapes::ShapePair::Sp1);
+    let pin = laboratory
+        .prepare(&Cell::of_table(sp1, Row::Pin, 3))
+        .unwrap();
+    let hae = laboratory
+        .prepare(&Cell::of_table(sp1, Row::HaeOne, 3))
+        .unwrap();
+    assert_eq!(pin.train, hae.train);
+    assert_eq!(pin.targets, hae.targets);
+    assert_eq!(pin.settings.pairs.start(), hae.settings.pairs.start());
+    assert_eq!(pin.settings.pairs.start().inputs.rows, 4);
+    assert_eq!((pin.train.rows, pin.test.rows), (705, 704));
+    let fixed = laboratory
+        .prepare(&Cell::of_table(sp1, Row::HaeFixed, 3))
+        .unwrap();
+    // Leaf tips to corners: matched points 110, 220, 330 and 0.
+    assert_eq!(fixed.settings.pairs.start().targets.row(0), [1.5, -1.5]);
+}
