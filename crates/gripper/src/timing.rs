@@ -50,7 +50,7 @@ pub const MEMORY: Duration = Duration::from_millis(2_000);
 
 /// Timeouts in a row after which requests are spaced out, so that no two that could be taken for
 /// each other are sent within [`MEMORY`].
-pub const PATIENCE: u32 = 3;
+pub const PATIENCE: u32 = 4;
 
 /// How long a failed port rests before it is tried again.
 pub const PORT_REST: Duration = Duration::from_millis(100);

@@ -606,6 +606,41 @@ fn a_dropped_reply_costs_one_cycle() {
 }
 
 #[test]
+fn a_gripper_that_was_late_for_a_while_is_back_as_soon_as_it_answers_in_time() {
+    let mut worst = 0;
+    for delay in [5, 8, 10, 12, 15, 20, 30, 50, 100, 300] {
+        for span in [1, 10, 45, 100, 500, 3_000] {
+            let mut bench = three();
+            bench.activate();
+            let motion = Motion {
+                position: [100; 4],
+                speed: [255; 4],
+                force: [100; 4],
+            };
+            let end = bench.clock.now() + Duration::from_millis(span);
+            bench.truth.set_reply_delay(Duration::from_millis(delay));
+            while bench.clock.now() < end {
+                bench.driver.set_motion(Some(motion), bench.clock.now());
+                let _ = bench.next(end - bench.clock.now());
+            }
+            bench.truth.set_reply_delay(Duration::from_millis(0));
+            let (back, writes) = (bench.clock.now(), bench.truth.writes());
+            while bench.truth.writes() == writes {
+                bench.driver.set_motion(Some(motion), bench.clock.now());
+                let _ = bench.next(Duration::from_millis(10));
+                assert!(
+                    bench.clock.now() < back + Duration::from_millis(1_000),
+                    "{delay} ms late for {span} ms"
+                );
+            }
+            worst = worst.max((bench.clock.now() - back).as_millis());
+        }
+    }
+    println!("60 spells of lateness: commanded again at most {worst} ms after the end");
+    assert!(worst <= 400);
+}
+
+#[test]
 fn cutting_the_wire_at_every_byte_leaves_no_axis_more_than_forty_counts_further() {
     let mut worst = 0.0_f32;
     let mut cuts = 0;

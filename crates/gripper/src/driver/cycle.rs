@@ -104,6 +104,17 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
     }
 
+    /// A late reply is a sign of life: whoever sends it is asked again without the long pauses kept
+    /// for a gripper that is not there.
+    pub(super) fn note_late(&mut self, now: Instant) {
+        let stale = self.link.counters().stale;
+        if stale != self.stale {
+            self.stale = stale;
+            self.misses = 0;
+            self.next_start = self.next_start.min(timing::after(now, self.config.cycle));
+        }
+    }
+
     /// A reply the link let through: reserved bits, echo, meaning; then the task under way.
     fn understand(
         &mut self,

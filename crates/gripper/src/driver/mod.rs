@@ -137,8 +137,10 @@ pub struct Driver<S, F, const X: usize> {
     sent: Option<Motion<X>>,
     /// Nothing is written before a read has been answered.
     verify: bool,
-    /// Requests in a row without an answer.
+    /// Requests in a row without an answer, late ones included.
     misses: u32,
+    /// Late replies seen so far.
+    stale: u32,
     next_start: Instant,
     running: Option<Running>,
     outcome: Option<(Task, Outcome)>,
@@ -207,6 +209,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             sent: None,
             verify: true,
             misses: 0,
+            stale: 0,
             next_start: Instant::from_ticks(0),
             running: None,
             outcome: None,
@@ -276,8 +279,10 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Gripper<X> for D
     type Error = Error;
 
     fn poll(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
-        if let Some(result) = self.hear(now) {
-            return Some(result);
+        let heard = self.hear(now);
+        self.note_late(now);
+        if heard.is_some() {
+            return heard;
         }
         if let Some(error) = self.overdue(now) {
             return Some(Err(error));

@@ -1,6 +1,7 @@
 //! Whether the bytes received are the reply: length, CRC, then what the frame says.
 
 use super::{Echo, Error, Field, Link, Signature};
+use crate::Instant;
 use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
 
 /// What the transaction under way expects.
@@ -8,6 +9,7 @@ use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
 pub(super) struct Pending {
     pub(super) request_len: usize,
     pub(super) reply: Signature,
+    pub(super) sent: Instant,
     /// Bits of the register bytes that are always 0.
     reserved: &'static [u8],
     /// What a write's reply repeats after the function code.
@@ -26,7 +28,12 @@ pub(super) enum Verdict {
 }
 
 impl Pending {
-    pub(super) fn new(unit: u8, request: &Request<'_>, reserved: &'static [u8]) -> Self {
+    pub(super) fn new(
+        unit: u8,
+        request: &Request<'_>,
+        reserved: &'static [u8],
+        sent: Instant,
+    ) -> Self {
         let words = |first: u16, second: u16| {
             let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
             Some([a, b, c, d])
@@ -39,6 +46,7 @@ impl Pending {
         Self {
             request_len: request.buffer_len(),
             reply: Signature::of(unit, request),
+            sent,
             reserved,
             echo,
         }

@@ -186,7 +186,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
         if !self.is_free(now) {
             return Err(Refused::Busy);
         }
-        let pending = Pending::new(self.config.unit, request, reserved);
+        let pending = Pending::new(self.config.unit, request, reserved, now);
         if pending.reply.length > MAX_REPLY {
             return Err(Refused::Length);
         }
@@ -255,7 +255,8 @@ impl<S: Read + ReadReady + Write> Link<S> {
     /// drained as after any other failure.
     pub fn reject(&mut self, field: Field, request: &Request<'_>, now: Instant) -> Error {
         self.counters.replies = self.counters.replies.wrapping_sub(1);
-        self.owed.add(Signature::of(self.config.unit, request), now);
+        self.owed
+            .add(Signature::of(self.config.unit, request), now, now);
         self.fail(Error::Shape(field), now, now)
     }
 
@@ -267,7 +268,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
         last_due: Instant,
     ) -> Option<Result<usize, Error>> {
         if let Err(fault) = self.receive() {
-            self.owed.add(pending.reply, now);
+            self.owed.add(pending.reply, pending.sent, now);
             return Some(Err(Error::Port(self.fail_port(fault, now))));
         }
         let error = match self.judge(&pending) {
@@ -294,7 +295,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
             _ => first_due,
         };
         if !matches!(error, Error::Exception(_)) {
-            self.owed.add(pending.reply, now);
+            self.owed.add(pending.reply, pending.sent, now);
             self.echo = Echo::Unknown;
         }
         Some(Err(self.fail(error, now, rest)))
@@ -339,11 +340,16 @@ impl<S: Read + ReadReady + Write> Link<S> {
 
     fn begin_drain(&mut self, now: Instant, rest: Instant) {
         self.length = 0;
+        self.drain_from(now, rest, 0);
+    }
+
+    /// Drains on with the bytes already received.
+    fn drain_from(&mut self, now: Instant, rest: Instant, thrown: u32) {
         self.state = State::Draining {
             until: rest,
             heard: now,
             noisy: now,
-            thrown: 0,
+            thrown,
         };
     }
 

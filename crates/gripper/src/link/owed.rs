@@ -2,8 +2,9 @@
 //!
 //! A Modbus RTU reply names only its slave, function and length. So a request that went unanswered
 //! leaves a debt: for [`timing::MEMORY`] no other request is sent whose reply would look the same.
-//! A reply to a later, different request pays all debts as far as order on the line goes (a slave
-//! answers in order): such a debt is [`Debt::Settled`], and still avoided where that costs nothing.
+//! A reply to a later request, fresh or late, settles the debts before it as far as order on the line
+//! goes (a slave answers in order): such a debt is [`Debt::Settled`], and still avoided where that
+//! costs nothing.
 
 use crate::{Instant, rtu::Request, timing};
 use heapless::Vec;
@@ -54,6 +55,7 @@ pub enum Debt {
 #[derive(Clone, Copy, Debug)]
 struct Entry {
     signature: Signature,
+    sent: Instant,
     until: Instant,
     settled: bool,
 }
@@ -81,14 +83,16 @@ impl Owed {
         }
     }
 
-    /// The request of this look went unanswered at `now`.
-    pub(super) fn add(&mut self, signature: Signature, now: Instant) {
+    /// The request of this look, sent at `sent`, went unanswered at `now`.
+    pub(super) fn add(&mut self, signature: Signature, sent: Instant, now: Instant) {
         let entry = Entry {
             signature,
+            sent,
             until: timing::after(now, timing::MEMORY),
             settled: false,
         };
-        match self.0.iter_mut().find(|known| known.signature == signature) {
+        let known = |known: &&mut Entry| known.signature == signature;
+        match self.0.iter_mut().find(known) {
             Some(known) => *known = entry,
             // Never full: a request is refused when it would need an entry that is not there.
             None => drop(self.0.push(entry)),
@@ -109,9 +113,15 @@ impl Owed {
             .find(|owed| owed.head == *head && expected.is_none_or(|fresh| fresh.head != *head))
     }
 
-    /// The owed reply of this look has come.
+    /// The owed reply of this look has come: late, but in order, so that what was asked before it is
+    /// settled.
     pub(super) fn pay(&mut self, signature: Signature) {
-        self.0.retain(|entry| entry.signature != signature);
+        let paid = self.0.iter().find(|entry| entry.signature == signature);
+        if let Some(sent) = paid.map(|entry| entry.sent) {
+            self.0.retain(|entry| entry.signature != signature);
+            let before = self.0.iter_mut().filter(|entry| entry.sent < sent);
+            before.for_each(|entry| entry.settled = true);
+        }
     }
 
     /// When the first debt ends.

@@ -55,8 +55,11 @@ impl<S: Read + ReadReady + Write> Link<S> {
             return Err(self.fail_port(fault, now));
         }
         if self.length > 0 {
-            self.throw_away(self.length, now);
-            self.begin_drain(now, now);
+            // Kept for the drain: they may be the start of a late reply.
+            let (length, late) = (self.length, self.recognise_late(now));
+            let noise = (length - late) as u32;
+            self.counters.noise = self.counters.noise.wrapping_add(noise);
+            self.drain_from(now, now, noise);
         }
         Ok(())
     }
