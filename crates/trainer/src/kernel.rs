@@ -7,8 +7,13 @@
 pub(crate) mod backward;
 pub(crate) mod forward;
 pub(crate) mod lanes;
+pub(crate) mod motion;
 pub(crate) mod nadam;
+#[cfg(test)]
 pub(crate) mod nearest;
+#[cfg(test)]
+mod tests;
+pub(crate) mod tracker;
 
 use crate::data::Matrix;
 use crate::network::Network;

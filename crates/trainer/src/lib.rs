@@ -11,6 +11,7 @@
 pub mod algorithm;
 pub mod cost;
 pub mod data;
+pub mod figures;
 pub(crate) mod kernel;
 pub mod measures;
 pub mod model;

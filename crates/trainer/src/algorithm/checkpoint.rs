@@ -32,7 +32,9 @@ pub enum Error {
         why: String,
     },
     /// Of other samples.
-    #[error("the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected}); use the samples it was made with")]
+    #[error(
+        "the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected}); use the samples it was made with"
+    )]
     OtherData {
         /// First digits in the file.
         found: String,
@@ -40,7 +42,9 @@ pub enum Error {
         expected: String,
     },
     /// Of other settings.
-    #[error("the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed); use those it was made with")]
+    #[error(
+        "the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed); use those it was made with"
+    )]
     OtherSettings,
 }
 
@@ -128,8 +132,7 @@ impl Trainer {
     /// # Errors
     /// [`Error::Broken`], [`Error::OtherData`], [`Error::OtherSettings`]; then nothing has changed.
     pub fn resume(&mut self, bytes: &[u8]) -> Result<(), Error> {
-        let (_, header) =
-            SafeTensors::read_metadata(bytes).map_err(|e| broken(e.to_string()))?;
+        let (_, header) = SafeTensors::read_metadata(bytes).map_err(|e| broken(e.to_string()))?;
         let words = header.metadata().clone().unwrap_or_default();
         let word = |key: &str| {
             let word = words.get(key);

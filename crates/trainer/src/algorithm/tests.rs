@@ -243,8 +243,18 @@ fn constant_columns_duplicates_and_far_pairs_are_told_but_trained() {
     assert!(trained.unwrap().networks.f.is_finite());
     assert_eq!(warnings.len(), 3, "{warnings:?}");
     assert!(warnings[0].to_string().contains("input column 3 is 0.25"));
-    assert!(matches!(warnings[1], Warning::DuplicateRows { count: 1, .. }));
-    assert!(matches!(warnings[2], Warning::PairOutside { pair: 1, column: 1, .. }));
+    assert!(matches!(
+        warnings[1],
+        Warning::DuplicateRows { count: 1, .. }
+    ));
+    assert!(matches!(
+        warnings[2],
+        Warning::PairOutside {
+            pair: 1,
+            column: 1,
+            ..
+        }
+    ));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! The samples are cut into at most [`PARTS`] parts, whatever the number of threads; each part sums its own gradient, and the parts
 //! are added in order. A term with factor 0 costs nothing.
 
+mod chamfer;
 mod cloud;
 mod phases;
 #[cfg(test)]
@@ -16,7 +17,7 @@ use crate::kernel::lanes::LANES;
 use crate::kernel::{Blocks, Machine, Shape, nadam};
 use crate::optimizer::{LearningRate, Nadam};
 use crate::pool::Pool;
-use cloud::{PairPart, QPart, XPart, ranges};
+use cloud::{Cloud, PairPart, QPart, Ways, XPart, ranges};
 
 /// Parts of each cloud of samples.
 const PARTS: usize = 8;
@@ -46,21 +47,8 @@ pub(crate) struct Engine {
     by_code: Vec<f32>,
     image: Vec<f32>,
     by_image: Vec<f32>,
-}
-
-/// A fixed cloud of samples.
-struct Cloud {
-    blocks: Blocks,
-    rows: Matrix,
-}
-
-impl Cloud {
-    fn new(rows: &Matrix) -> Self {
-        Self {
-            blocks: Blocks::from_matrix(rows),
-            rows: rows.clone(),
-        }
-    }
+    /// For each batch the ways of f(Q) and of g(X).
+    ways: Vec<[Ways; 2]>,
 }
 
 impl Engine {
@@ -83,10 +71,10 @@ impl Engine {
         let largest = batches.iter().map(|b| b.rows).max().unwrap_or(0);
         let q = Cloud::new(q);
         let q_parts = ranges(q.blocks.blocks())
-            .map(|r| QPart::new(r, f, g))
+            .map(|r| QPart::new(r, f, g, batches.len()))
             .collect();
         let x_parts = ranges(largest.div_ceil(LANES))
-            .map(|r| XPart::new(r, g, q.blocks.count.div_ceil(LANES) * f.outputs * LANES))
+            .map(|r| XPart::new(r, g, q.blocks.blocks() * f.outputs * LANES, batches.len()))
             .collect();
         Self {
             machine: Machine::best(),
@@ -105,6 +93,7 @@ impl Engine {
             q_parts,
             x_parts,
             pair: PairPart::new(f, g),
+            ways: batches.iter().map(|_| Default::default()).collect(),
             f,
             g,
         }

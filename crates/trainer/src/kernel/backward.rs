@@ -214,7 +214,10 @@ unsafe fn outer_rows<V: Lanes, const N: usize>(
     unsafe {
         let values = values.add(first * LANES);
         let sums = sums.add(first * padded);
-        let mut sum: [V; N] = core::array::from_fn(|n| V::load(sums.add(n * padded)));
+        let mut sum = [V::splat(0.0); N];
+        for (n, sum) in sum.iter_mut().enumerate() {
+            *sum = V::load(sums.add(n * padded));
+        }
         for p in 0..LANES {
             let u = V::load(units.as_ptr().add(p * LANES));
             for (n, sum) in sum.iter_mut().enumerate() {
@@ -272,8 +275,10 @@ unsafe fn active_sums<V: Lanes>(
     // SAFETY: the caller checked the lengths.
     unsafe {
         let zero = V::splat(0.0);
-        let active: [u16; LANES] =
-            core::array::from_fn(|p| V::bits(V::load(h.as_ptr().add(p * LANES)).gt(zero)));
+        let mut active = [0_u16; LANES];
+        for (p, active) in active.iter_mut().enumerate() {
+            *active = V::bits(V::load(h.as_ptr().add(p * LANES)).gt(zero));
+        }
         let mut c = 0;
         while c + 4 <= cells {
             active_rows::<V, 4>(jacobian, &active, sums, c);
@@ -297,7 +302,10 @@ unsafe fn active_rows<V: Lanes, const N: usize>(
     unsafe {
         let jacobian = jacobian.add(first * LANES);
         let sums = sums.add(first * LANES);
-        let mut sum: [V; N] = core::array::from_fn(|n| V::load(sums.add(n * LANES)));
+        let mut sum = [V::splat(0.0); N];
+        for (n, sum) in sum.iter_mut().enumerate() {
+            *sum = V::load(sums.add(n * LANES));
+        }
         for (p, &active) in active.iter().enumerate() {
             let active = V::mask(active);
             for (n, sum) in sum.iter_mut().enumerate() {

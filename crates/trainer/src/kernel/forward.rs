@@ -124,7 +124,10 @@ unsafe fn activate<V: Lanes, const N: usize>(
     // SAFETY: units first..first + N are there, the caller says.
     unsafe {
         let rows: [*const f32; N] = core::array::from_fn(|u| units.add((first + u) * stride));
-        let mut z: [V; N] = rows.map(|row| V::splat(*row.add(shape.inputs)));
+        let mut z = [V::splat(0.0); N];
+        for (z, row) in z.iter_mut().zip(rows) {
+            *z = V::splat(*row.add(shape.inputs));
+        }
         for i in 0..shape.inputs {
             let x = V::load(input.add(i * LANES));
             for (z, row) in z.iter_mut().zip(rows) {
@@ -174,7 +177,10 @@ unsafe fn output_rows<V: Lanes, const N: usize>(
     // SAFETY: outputs first..first + N are there, the caller says.
     unsafe {
         let bias = units.add(shape.hidden * stride + first);
-        let mut y: [V; N] = core::array::from_fn(|n| V::splat(*bias.add(n)));
+        let mut y = [V::splat(0.0); N];
+        for (n, y) in y.iter_mut().enumerate() {
+            *y = V::splat(*bias.add(n));
+        }
         let mut row = units.add(shape.inputs + 1 + first);
         for j in 0..shape.hidden {
             let h = V::load(hidden.add(j * LANES));

@@ -26,6 +26,8 @@ pub(crate) trait Lanes: Copy {
     unsafe fn keep(self, mask: Self::Mask) -> Self;
     /// `self` where the mask is set, `other` elsewhere.
     unsafe fn choose(self, mask: Self::Mask, other: Self) -> Self;
+    /// The least lane; any, if one is NaN.
+    unsafe fn least(self) -> f32;
     /// Bit l is lane l of the mask.
     unsafe fn bits(mask: Self::Mask) -> u16;
     /// The mask with these bits.
@@ -125,6 +127,20 @@ impl Lanes for Plain {
         Self(out)
     }
     #[inline(always)]
+    unsafe fn least(self) -> f32 {
+        let mut lanes = self.0;
+        let mut half = LANES / 2;
+        while half > 0 {
+            for l in 0..half {
+                if lanes[l + half] < lanes[l] {
+                    lanes[l] = lanes[l + half];
+                }
+            }
+            half /= 2;
+        }
+        lanes[0]
+    }
+    #[inline(always)]
     unsafe fn bits(mask: u16) -> u16 {
         mask
     }
@@ -193,6 +209,10 @@ mod x86 {
         #[inline(always)]
         unsafe fn choose(self, mask: __mmask16, other: Self) -> Self {
             Self(unsafe { _mm512_mask_mov_ps(other.0, mask, self.0) })
+        }
+        #[inline(always)]
+        unsafe fn least(self) -> f32 {
+            unsafe { _mm512_reduce_min_ps(self.0) }
         }
         #[inline(always)]
         unsafe fn bits(mask: __mmask16) -> u16 {
@@ -268,6 +288,19 @@ mod x86 {
                     _mm256_blendv_ps(o.0, self.0, mask.0),
                     _mm256_blendv_ps(o.1, self.1, mask.1),
                 )
+            }
+        }
+        #[inline(always)]
+        unsafe fn least(self) -> f32 {
+            unsafe {
+                let eight = _mm256_min_ps(self.0, self.1);
+                let four = _mm_min_ps(
+                    _mm256_castps256_ps128(eight),
+                    _mm256_extractf128_ps::<1>(eight),
+                );
+                let two = _mm_min_ps(four, _mm_movehl_ps(four, four));
+                let one = _mm_min_ss(two, _mm_shuffle_ps::<1>(two, two));
+                _mm_cvtss_f32(one)
             }
         }
         #[inline(always)]

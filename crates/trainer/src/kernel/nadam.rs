@@ -30,9 +30,9 @@ unsafe fn step_kernel<V: Lanes>(
     assert!(partials.iter().all(|partial| partial.len() == length));
     // SAFETY: the lengths were checked; features by the caller.
     unsafe {
-        let [rate, keep1, take1] = [rate, BETA1 as f32, (1.0 - BETA1) as f32].map(|v| V::splat(v));
-        let [keep2, take2, epsilon] =
-            [BETA2 as f32, (1.0 - BETA2) as f32, EPSILON as f32].map(|v| V::splat(v));
+        let (keep1, take1) = (V::splat(BETA1 as f32), V::splat((1.0 - BETA1) as f32));
+        let (keep2, take2) = (V::splat(BETA2 as f32), V::splat((1.0 - BETA2) as f32));
+        let (rate, epsilon) = (V::splat(rate), V::splat(EPSILON as f32));
         for at in (0..length).step_by(LANES) {
             let mut g = V::splat(0.0);
             for partial in partials {

@@ -1,11 +1,10 @@
 //! The phases of a step: forward, nearest neighbours, backward, update. Within a phase the parts are independent.
 
-use super::cloud::{PairPart, QPart, Sums, XPart};
-use super::{Cloud, Engine, Parts, Weights, nadam};
+use super::cloud::{Cloud, PairPart, QPart, Sums, Ways, XPart};
+use super::{Engine, Parts, Weights, nadam};
 use crate::kernel::backward::{Flow, backward, backward_through};
 use crate::kernel::forward::{forward, forward_jacobian};
 use crate::kernel::lanes::LANES;
-use crate::kernel::nearest::nearest;
 use crate::kernel::{Blocks, Machine, Shape};
 use core::ops::Range;
 
@@ -22,6 +21,9 @@ struct Shared<'a> {
     q: &'a Cloud,
     x: &'a Cloud,
     weights: &'a Weights,
+    batch: usize,
+    /// Whether the ways of f(Q), g(X) begin anew.
+    forget: [bool; 2],
 }
 
 /// A piece of work: a part with its stretches of the arrays that all parts share.
@@ -40,7 +42,11 @@ enum Piece<'a> {
 }
 
 /// Cuts off the front, so many blocks of `dims` dimensions.
-fn cut<'a>(rest: &mut &'a mut [f32], blocks: &Range<usize>, dims: usize) -> &'a mut [f32] {
+pub(super) fn cut<'a>(
+    rest: &mut &'a mut [f32],
+    blocks: &Range<usize>,
+    dims: usize,
+) -> &'a mut [f32] {
     let length = (blocks.len() * dims * LANES).min(rest.len());
     let (front, back) = core::mem::take(rest).split_at_mut(length);
     *rest = back;
@@ -48,7 +54,7 @@ fn cut<'a>(rest: &mut &'a mut [f32], blocks: &Range<usize>, dims: usize) -> &'a 
 }
 
 /// A range of whole blocks of a cloud.
-fn stretch<'a>(cloud: &'a Blocks, blocks: &Range<usize>) -> &'a [f32] {
+pub(super) fn stretch<'a>(cloud: &'a Blocks, blocks: &Range<usize>) -> &'a [f32] {
     let width = cloud.dims * LANES;
     let end = blocks.end.min(cloud.blocks());
     &cloud.data[blocks.start.min(end) * width..end * width]
@@ -122,6 +128,8 @@ impl Engine {
             q: &self.q,
             x: &self.batches[batch],
             weights,
+            batch,
+            forget: self.ways[batch].each_ref().map(Ways::forget),
         };
         let mut pieces = Vec::with_capacity(2 * super::PARTS + 1);
         if weights.attraction != 0.0 && weights.alpha != 0.0 {
@@ -149,64 +157,6 @@ impl Engine {
         pieces.push(Piece::Pair(&mut self.pair));
         self.pool
             .for_each(&mut pieces, |piece| work(&shared, piece));
-    }
-
-    /// Both directions of both Chamfer distances, and the gradient by the moving points that belong to the part.
-    fn nearest_phase(&mut self, weights: &Weights, batch: usize) {
-        let x = &self.batches[batch];
-        let near = Near {
-            machine: self.machine,
-            q: &self.q,
-            x,
-            code: &self.code,
-            image: &self.image,
-            factor_q: 2.0 * weights.attraction / self.q.blocks.count as f64,
-            factor_x: 2.0 * weights.attraction / x.blocks.count as f64,
-            alpha: weights.alpha,
-            dims: (self.f.inputs, self.f.outputs),
-        };
-        let mut pieces: Vec<NearPiece<'_>> = Vec::with_capacity(2 * super::PARTS);
-        let mut by_image = &mut self.by_image[..];
-        for part in &mut self.x_parts {
-            let by_image = cut(&mut by_image, &part.blocks, self.g.outputs);
-            pieces.push(NearPiece::X(part, by_image));
-        }
-        let mut by_code = &mut self.by_code[..];
-        for part in &mut self.q_parts {
-            let by_code = cut(&mut by_code, &part.blocks, self.f.outputs);
-            pieces.push(NearPiece::Q(part, by_code));
-        }
-        self.pool.for_each(&mut pieces, |piece| match piece {
-            NearPiece::X(part, by_image) => near.of_targets(part, by_image),
-            NearPiece::Q(part, by_code) => near.of_inputs(part, by_code),
-        });
-    }
-
-    /// What parts add to moving points of other parts, in a fixed order.
-    fn merge(&mut self, weights: &Weights, batch: usize) {
-        for part in &self.x_parts {
-            for (sum, value) in self.by_code.iter_mut().zip(&part.by_code) {
-                *sum += value;
-            }
-        }
-        if weights.alpha == 0.0 || self.batches[batch].rows.rows == 0 {
-            return;
-        }
-        let dims = self.g.outputs;
-        let c = (2.0 * weights.attraction * weights.alpha / self.q.blocks.count as f64) as f32;
-        for part in &mut self.q_parts {
-            let first = part.blocks.start * LANES;
-            for (n, &nearest) in part.nearest_image.iter().enumerate() {
-                let at = nearest as usize / LANES * dims * LANES + nearest as usize % LANES;
-                let mut square = 0.0;
-                for (i, q) in self.q.rows.row(first + n).iter().enumerate() {
-                    let d = self.image[at + i * LANES] - q;
-                    square += d * d;
-                    self.by_image[at + i * LANES] += c * d;
-                }
-                part.sums.input_chamfer += f64::from(square);
-            }
-        }
     }
 
     /// The parts of the cost from the sums.
@@ -281,14 +231,10 @@ fn forward_piece(shared: &Shared<'_>, piece: &mut Piece<'_>) {
         Piece::X { part, image, .. } => {
             let x = stretch(&shared.x.blocks, &part.blocks);
             let image = &mut image[..x.len() / shared.g.inputs * shared.g.outputs];
-            forward(
-                shared.machine,
-                shared.g,
-                shared.units_g,
-                x,
-                image,
-                &mut part.hidden,
-            );
+            let (units, hidden) = (shared.units_g, &mut part.hidden);
+            forward(shared.machine, shared.g, units, x, image, hidden);
+            let motion = &mut part.memory[shared.batch].motion;
+            motion.look(shared.machine, shared.g.outputs, image, shared.forget[1]);
         }
         Piece::Pair(part) => shared.pairs(part),
     }
@@ -348,6 +294,10 @@ impl Shared<'_> {
             forward_jacobian(self.machine, f, units, products, q, code, jacobian, hidden);
             clear_filling(jacobian, cells, &part.blocks, count);
             part.sums.distortion = square_sum(jacobian);
+        }
+        if self.weights.attraction != 0.0 {
+            let motion = &mut part.memory[self.batch].motion;
+            motion.look(self.machine, f.outputs, code, self.forget[0]);
         }
         if self.weights.reconstruction == 0.0 {
             by_code.fill(0.0);
@@ -428,145 +378,5 @@ impl Shared<'_> {
         };
         backward(self.machine, shape, flat, flow, gradient);
         mean
-    }
-}
-
-enum NearPiece<'a> {
-    X(&'a mut XPart, &'a mut [f32]),
-    Q(&'a mut QPart, &'a mut [f32]),
-}
-
-/// What the search for neighbours reads.
-struct Near<'a> {
-    machine: Machine,
-    q: &'a Cloud,
-    x: &'a Cloud,
-    code: &'a [f32],
-    image: &'a [f32],
-    /// 2·λ3/N of each cloud.
-    factor_q: f64,
-    factor_x: f64,
-    alpha: f64,
-    /// D_Q, D_X.
-    dims: (usize, usize),
-}
-
-impl Near<'_> {
-    /// Of each target sample the nearest f(q); of each g(x) the nearest input sample.
-    fn of_targets(&self, part: &mut XPart, by_image: &mut [f32]) {
-        let (dims_q, dims_x) = self.dims;
-        let x = stretch(&self.x.blocks, &part.blocks);
-        let first = part.blocks.start * LANES;
-        let count = (x.len() / dims_x).min(self.x.blocks.count.saturating_sub(first));
-        part.sums = Sums::default();
-        part.nearest_code.resize(count, 0);
-        let candidates = self.q.blocks.count;
-        nearest(
-            self.machine,
-            dims_x,
-            x,
-            self.code,
-            candidates,
-            &mut part.nearest_code,
-        );
-        part.by_code.fill(0.0);
-        let c = self.factor_x as f32;
-        for (n, &m) in part.nearest_code.iter().enumerate() {
-            let at = m as usize / LANES * dims_x * LANES + m as usize % LANES;
-            let mut square = 0.0;
-            for (i, x) in self.x.rows.row(first + n).iter().enumerate() {
-                let d = self.code[at + i * LANES] - x;
-                square += d * d;
-                part.by_code[at + i * LANES] += c * d;
-            }
-            part.sums.target_chamfer += f64::from(square);
-        }
-        if self.alpha == 0.0 {
-            return;
-        }
-        let start = part.blocks.start * dims_q * LANES;
-        let image = &self.image[start..start + x.len() / dims_x * dims_q];
-        part.nearest_q.resize(count, 0);
-        let q = &self.q.blocks.data;
-        nearest(
-            self.machine,
-            dims_q,
-            image,
-            q,
-            candidates,
-            &mut part.nearest_q,
-        );
-        let by_image = &mut by_image[..image.len()];
-        by_image.fill(0.0);
-        let c = (self.factor_x * self.alpha) as f32;
-        let target = Attraction {
-            moving: image,
-            fixed: self.q,
-            factor: c,
-        };
-        part.sums.input_chamfer = target.add(&part.nearest_q, by_image);
-    }
-
-    /// Of each f(q) the nearest target sample; of each input sample the nearest g(x).
-    fn of_inputs(&self, part: &mut QPart, by_code: &mut [f32]) {
-        let (dims_q, dims_x) = self.dims;
-        let q = stretch(&self.q.blocks, &part.blocks);
-        let first = part.blocks.start * LANES;
-        let count = (q.len() / dims_q).min(self.q.blocks.count.saturating_sub(first));
-        let start = part.blocks.start * dims_x * LANES;
-        let code = &self.code[start..start + by_code.len()];
-        part.nearest_x.resize(count, 0);
-        let (x, candidates) = (&self.x.blocks.data, self.x.blocks.count);
-        nearest(
-            self.machine,
-            dims_x,
-            code,
-            x,
-            candidates,
-            &mut part.nearest_x,
-        );
-        let target = Attraction {
-            moving: code,
-            fixed: self.x,
-            factor: self.factor_q as f32,
-        };
-        part.sums.target_chamfer = target.add(&part.nearest_x, by_code);
-        if self.alpha != 0.0 {
-            part.nearest_image.resize(count, 0);
-            nearest(
-                self.machine,
-                dims_q,
-                q,
-                self.image,
-                candidates,
-                &mut part.nearest_image,
-            );
-        }
-    }
-}
-
-/// Moving points, each drawn to its nearest fixed one.
-struct Attraction<'a> {
-    moving: &'a [f32],
-    fixed: &'a Cloud,
-    factor: f32,
-}
-
-impl Attraction<'_> {
-    /// Adds factor·(moving − fixed) to the gradient; returns Σ ‖moving − fixed‖².
-    fn add(&self, nearest: &[u32], gradient: &mut [f32]) -> f64 {
-        let dims = self.fixed.blocks.dims;
-        let mut sum = 0.0;
-        for (n, &target) in nearest.iter().enumerate() {
-            let at = n / LANES * dims * LANES + n % LANES;
-            let mut square = 0.0;
-            for (i, fixed) in self.fixed.rows.row(target as usize).iter().enumerate() {
-                let d = self.moving[at + i * LANES] - fixed;
-                square += d * d;
-                gradient[at + i * LANES] += self.factor * d;
-            }
-            sum += f64::from(square);
-        }
-        sum
     }
 }
