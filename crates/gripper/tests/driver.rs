@@ -280,3 +280,37 @@ fn cycles_are_at_least_five_milliseconds_apart() {
     );
     assert!(starts[1..].windows(2).all(|pair| pair[1] - pair[0] < 5_100));
 }
+
+#[test]
+fn until_it_echoes_the_first_motion_a_held_finger_follows_finger_a() {
+    let (line, mut gripper) = gripper();
+    let mut slave = Slave::three_finger();
+    slave.status = [
+        0xB9, 0xEA, 0, 0xFF, 0xBC, 0, 0, 0xC1, 0, 0, 0xBD, 0, 0, 0x89, 0, 0,
+    ];
+    // The registers lag: the first two replies still show the echo of before.
+    slave.echoes.clear();
+    let hold = Motion {
+        position: [255, 255, 255, 0x89],
+        speed: [255; 4],
+        force: [150; 4],
+    };
+    let mut written = 0;
+    for cycle in 0..6 {
+        gripper.set_motion((cycle > 0).then_some(hold), at(line.now()));
+        let status = run_gripper(
+            &line,
+            &mut gripper,
+            line.now() + 100_000,
+            &mut |line, end, request| {
+                written += u32::from(request[1] == 0x17);
+                if written > 2 {
+                    slave.echoes = vec![(3, 3), (6, 6), (9, 9), (12, 12)];
+                }
+                slave.serve(line, end, request);
+            },
+        );
+        assert_eq!(status.unwrap().unwrap().hold(), hold.position, "{cycle}");
+    }
+    assert!(gripper.accepted());
+}

@@ -143,8 +143,9 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 return Err(error.into());
             }
         };
-        let ours = self.family.is_individual() && self.sent.is_some();
-        if !ours {
+        let ours = self.individual.contains(&snapshot.echo);
+        self.is_individual |= ours && snapshot.status.going_to;
+        if !self.is_individual {
             snapshot.status.echo = self.family.followed(&snapshot);
         }
         self.snapshot = Some(snapshot);
@@ -185,8 +186,11 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         if doing.function == function::READ_WRITE {
             self.echo.note_sent(self.family.positions(&doing.block));
         }
-        if doing.motion.is_some() {
-            self.sent = doing.motion;
+        if let Some(motion) = doing.motion {
+            self.sent = Some(motion);
+            if self.family.is_individual() {
+                self.individual.write(motion.position);
+            }
         }
         self.next_start = timing::after(now, self.config.cycle.max(timing::CYCLE));
         self.doing = Some(doing);

@@ -3,7 +3,7 @@
 use crate::link::Field;
 use crate::registers::{Axis, three_finger, two_finger};
 use crate::rtu::function::{READ_HOLDING, READ_INPUT};
-use crate::{Activation, Contact, Fault, Instant, Motion, Status};
+use crate::{Activation, Fault, Instant, Motion, Status};
 
 /// Room for a block of either family.
 pub(super) type Block = [u8; 16];
@@ -71,7 +71,7 @@ pub trait Family<const X: usize>: sealed::Sealed {
     /// Whether `echo` repeats the motion on the axes it commands.
     #[doc(hidden)]
     fn repeats(&self, motion: &Motion<X>, echo: &[u8; X]) -> bool;
-    /// A motion with every axis on its own has been accepted: echoes mean what they say.
+    /// Whether motions let every axis follow its own position.
     #[doc(hidden)]
     fn is_individual(&self) -> bool;
     /// The position each axis follows, where its own echo cannot be it.
@@ -147,29 +147,12 @@ impl Family<4> for ThreeFingerFamily {
             Err(_) if check_reserved => return Err(Field::Reserved),
             _ => three_finger::Status::decode_any(block),
         };
-        let activation = match said.busy {
-            _ if !said.activated => Activation::Reset,
-            three_finger::Busy::Reset => Activation::Reset,
-            three_finger::Busy::Activating => Activation::Activating,
-            three_finger::Busy::ChangingMode => Activation::ChangingMode,
-            three_finger::Busy::Ready => Activation::Ready,
-        };
-        let echo = said.axes.map(|axis| axis.echo);
-        let status = Status {
-            stamp,
-            activation,
-            going_to: said.going_to,
-            contact: said.contact,
-            echo,
-            position: said.axes.map(|axis| axis.position),
-            current: said.axes.map(|axis| axis.current),
-            fault: said.fault,
-        };
+        let status = said.report(stamp, true);
         Ok(Snapshot {
             status,
             activated: said.activated,
             mode: said.mode,
-            echo,
+            echo: status.echo,
             raw: *block,
         })
     }
@@ -239,23 +222,8 @@ impl Family<4> for ThreeFingerFamily {
         self.control == Control::INDIVIDUAL
     }
 
-    /// The status does not say whether B and C follow A (rICF has no echo). An axis stopped while
-    /// closing at a count above its own echo (or the other way round) was not following that echo:
-    /// then it was finger A's.
     fn followed(&self, snapshot: &Snapshot<4>) -> [u8; 4] {
-        let Status {
-            contact, position, ..
-        } = snapshot.status;
-        let own = snapshot.echo;
-        let explains = |axis: usize, echo: u8| match contact[axis] {
-            Contact::ContactClosing => echo >= position[axis],
-            Contact::ContactOpening => echo <= position[axis],
-            Contact::Moving | Contact::AtPosition => true,
-        };
-        let follows_a = |axis: usize| {
-            (axis == 1 || axis == 2) && !explains(axis, own[axis]) && explains(axis, own[0])
-        };
-        core::array::from_fn(|axis| if follows_a(axis) { own[0] } else { own[axis] })
+        three_finger::Status::decode_any(&snapshot.raw).followed()
     }
 }
 
@@ -286,28 +254,12 @@ impl Family<1> for TwoFingerFamily {
             Err(_) if check_reserved => return Err(Field::Reserved),
             _ => two_finger::Status::decode_any(bytes).ok_or(Field::Reserved)?,
         };
-        let activation = match said.progress {
-            _ if !said.activated => Activation::Reset,
-            two_finger::Progress::Reset => Activation::Reset,
-            two_finger::Progress::Activating => Activation::Activating,
-            two_finger::Progress::Active => Activation::Ready,
-        };
-        let echo = [said.axis.echo];
-        let status = Status {
-            stamp,
-            activation,
-            going_to: said.going_to,
-            contact: [said.contact],
-            echo,
-            position: [said.axis.position],
-            current: [said.axis.current],
-            fault: said.fault,
-        };
+        let status = said.report(stamp);
         Ok(Snapshot {
             status,
             activated: said.activated,
             mode: three_finger::Mode::Basic,
-            echo,
+            echo: status.echo,
             raw: *block,
         })
     }

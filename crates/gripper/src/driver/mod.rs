@@ -30,6 +30,7 @@ use cycle::Doing;
 use echo::EchoWatch;
 use embedded_io::{Read, ReadReady, Write};
 use family::Snapshot;
+use heapless::HistoryBuf;
 use task::Running;
 
 /// What a driver needs to know about its line.
@@ -135,6 +136,10 @@ pub struct Driver<S, F, const X: usize> {
     doing: Option<Doing<X>>,
     /// The newest motion that left.
     sent: Option<Motion<X>>,
+    /// Positions of the newest motions with every axis on its own.
+    individual: HistoryBuf<[u8; X], 8>,
+    /// The gripper has echoed one of them: every axis follows its own echo.
+    is_individual: bool,
     /// Nothing is written before a read has been answered.
     verify: bool,
     /// Requests in a row without an answer, late ones included.
@@ -156,6 +161,7 @@ impl<S: Read + ReadReady + Write> ThreeFinger<S> {
     /// Which axes follow their own positions from the next motion on.
     pub fn set_control(&mut self, control: Control) {
         self.family.control = control;
+        self.forget_individual();
     }
 
     /// Asks for another grasping mode: **the fingers move**. The gripper must be ready. Motions
@@ -207,6 +213,8 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             echo: EchoWatch::default(),
             doing: None,
             sent: None,
+            individual: HistoryBuf::new(),
+            is_individual: false,
             verify: true,
             misses: 0,
             stale: 0,
@@ -214,6 +222,12 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             running: None,
             outcome: None,
         }
+    }
+
+    /// From now on an axis may follow another's position again.
+    fn forget_individual(&mut self) {
+        self.individual = HistoryBuf::new();
+        self.is_individual = false;
     }
 
     /// The port.

@@ -123,6 +123,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         if let Some(running) = self.running {
             self.outcome = Some((running.task, Outcome::Replaced));
         }
+        self.forget_individual();
         self.running = Some(Running {
             task,
             stage: Stage::Look,

@@ -1,7 +1,7 @@
 //! The 3-Finger Adaptive Gripper: 16 command bytes, 16 status bytes (8 registers each).
 
 use super::{Axis, AxisStatus, Fault, ReservedBits, reserved};
-use crate::Contact;
+use crate::{Activation, Contact, Instant};
 
 /// Bytes of either block.
 pub const BLOCK: usize = 16;
@@ -213,6 +213,51 @@ impl Status {
             fault: Fault::three_finger(block[2]),
             axes: core::array::from_fn(axis),
         }
+    }
+
+    /// What this means for whoever does not care which gripper it is. `individual`: the reader knows
+    /// that every axis follows its own position (it sent such a motion itself); else
+    /// [`Self::followed`] fills `echo`.
+    #[must_use]
+    pub fn report(&self, stamp: Instant, individual: bool) -> crate::Status<AXES> {
+        let own = self.axes.map(|axis| axis.echo);
+        crate::Status {
+            stamp,
+            activation: match self.busy {
+                _ if !self.activated => Activation::Reset,
+                Busy::Reset => Activation::Reset,
+                Busy::Activating => Activation::Activating,
+                Busy::ChangingMode => Activation::ChangingMode,
+                Busy::Ready => Activation::Ready,
+            },
+            going_to: self.going_to,
+            contact: self.contact,
+            echo: if individual { own } else { self.followed() },
+            position: self.axes.map(|axis| axis.position),
+            current: self.axes.map(|axis| axis.current),
+            fault: self.fault,
+        }
+    }
+
+    /// The position each axis follows, as far as the status can tell: it does not say whether B and
+    /// C follow A (rICF has no echo). A finger stopped while closing at a count above its own echo,
+    /// or while opening at one below, was not following that echo: then it was finger A's.
+    #[must_use]
+    pub fn followed(&self) -> [u8; AXES] {
+        let [a, ..] = self.axes.map(|axis| axis.echo);
+        core::array::from_fn(|k| {
+            let AxisStatus { echo, position, .. } = self.axes[k];
+            let explains = |echo: u8| match self.contact[k] {
+                Contact::ContactClosing => echo >= position,
+                Contact::ContactOpening => echo <= position,
+                Contact::Moving | Contact::AtPosition => true,
+            };
+            if (k == 1 || k == 2) && !explains(echo) && explains(a) {
+                a
+            } else {
+                echo
+            }
+        })
     }
 
     /// The block's bytes.

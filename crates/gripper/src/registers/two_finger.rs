@@ -1,7 +1,7 @@
 //! The 2F-85, 2F-140 and Hand-E: 6 command bytes, 6 status bytes (3 registers each).
 
 use super::{Axis, AxisStatus, Fault, ReservedBits, reserved};
-use crate::Contact;
+use crate::{Activation, Contact, Instant};
 
 /// Bytes of either block.
 pub const BLOCK: usize = 6;
@@ -177,6 +177,26 @@ impl Status {
                 current: block[5],
             },
         })
+    }
+
+    /// What this means for whoever does not care which gripper it is.
+    #[must_use]
+    pub fn report(&self, stamp: Instant) -> crate::Status<1> {
+        crate::Status {
+            stamp,
+            activation: match self.progress {
+                _ if !self.activated => Activation::Reset,
+                Progress::Reset => Activation::Reset,
+                Progress::Activating => Activation::Activating,
+                Progress::Active => Activation::Ready,
+            },
+            going_to: self.going_to,
+            contact: [self.contact],
+            echo: [self.axis.echo],
+            position: [self.axis.position],
+            current: [self.axis.current],
+            fault: self.fault,
+        }
     }
 
     /// The block's bytes.
