@@ -131,7 +131,7 @@ fn because(error: gripper::Error) -> String {
 /// A failure that says whether the port does not open or nobody answers on it, and what to try.
 pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Port, Status<AXES>)> {
     let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
-    let config = gripper::driver::Config::default();
+    let config = gripper::driver::Config::for_pc();
     let unit = config.unit;
     let clock = Clock::start();
     let end = Instant::now() + GRIPPER_WAIT;

@@ -1,6 +1,7 @@
 //! What a run hands to whoever watches it: frames, commands, statuses and events, each exactly once.
 
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
+use glove::scan::Health;
 use gripper::Instant;
 use gripper::{Motion, Status};
 
@@ -14,10 +15,8 @@ pub struct Imu {
     pub quaternion: [f32; 4],
     /// When it was read.
     pub stamp: Instant,
-    /// What was found at the sensor, in a word.
-    pub health: &'static str,
-    /// Whether the sample is fresh and usable.
-    pub good: bool,
+    /// What was found at the sensor.
+    pub health: Health,
 }
 
 /// One frame of the glove and what the bridge made of it.

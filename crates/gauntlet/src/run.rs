@@ -329,12 +329,7 @@ fn standing_faults(snapshot: &Snapshot) -> Vec<String> {
         faults.push(format!("held: {reason}"));
     }
     if let Some(frame) = &snapshot.frame {
-        let health = frame.samples.map(|sample| {
-            (
-                words::health(sample.health),
-                sample.health == glove::scan::Health::Good,
-            )
-        });
+        let health = frame.samples.map(|sample| sample.health);
         faults.extend(words::lost_sensors(&health));
     }
     if let Some(status) = &snapshot.status {

@@ -23,7 +23,6 @@ use crate::platform::{Clock, Pc};
 use crate::port::{BAUD, Port, Watch};
 use crate::record::{AXES, Command, Frame, Imu, Record, Sort};
 use crate::slots::MemorySlot;
-use crate::words;
 
 /// The bridge as a PC runs it.
 pub type PcApp = App<Pc, Port, ThreeFinger<Port>, MemorySlot, AXES>;
@@ -118,7 +117,7 @@ impl Session {
                         ..scan::Config::default()
                     },
                 );
-                let gripper = ThreeFinger::new(parts.gripper, gripper::driver::Config::default());
+                let gripper = ThreeFinger::new(parts.gripper, gripper::driver::Config::for_pc());
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
                 worker.run(&mut app);
                 Ok(())
@@ -374,8 +373,7 @@ fn frame_record(telemetry: &Telemetry<AXES>, answered: Option<bool>) -> Option<F
         Imu {
             quaternion: [quaternion.w, quaternion.i, quaternion.j, quaternion.k],
             stamp: sample.stamp,
-            health: words::health(sample.health),
-            good: sample.health == scan::Health::Good,
+            health: sample.health,
         }
     });
     Some(Frame {

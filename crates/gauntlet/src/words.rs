@@ -57,16 +57,6 @@ pub fn activation(activation: Activation) -> &'static str {
     }
 }
 
-/// How a sensor is.
-pub fn health(health: Health) -> &'static str {
-    match health {
-        Health::Good => "good",
-        Health::Starting => "starting",
-        Health::Missing(_) => "no answer",
-        Health::Rejected(_) => "rejected sample",
-    }
-}
-
 /// For each finger, whether all its five angles rest on good sensors. `good`: by segment.
 pub fn fingers_good(good: &[bool; hand::SEGMENT_COUNT]) -> [bool; 5] {
     let lost = good
@@ -80,12 +70,12 @@ pub fn fingers_good(good: &[bool; hand::SEGMENT_COUNT]) -> [bool; 5] {
 }
 
 /// The sensors that are not good, by name.
-pub fn lost_sensors(health: &[(&'static str, bool); hand::SEGMENT_COUNT]) -> Option<String> {
+pub fn lost_sensors(health: &[Health; hand::SEGMENT_COUNT]) -> Option<String> {
     let lost: Vec<String> = hand::SEGMENT_NAMES
         .iter()
         .zip(health)
-        .filter(|(_, (_, good))| !good)
-        .map(|(name, (word, _))| format!("{name} ({word})"))
+        .filter(|(_, health)| **health != Health::Good)
+        .map(|(name, health)| format!("{name} ({health})"))
         .collect();
     match lost.len() {
         0 => None,
@@ -110,14 +100,14 @@ mod tests {
 
     #[test]
     fn one_lost_sensor_is_named_and_many_are_counted() {
-        let mut health = [("good", true); hand::SEGMENT_COUNT];
+        let mut health = [Health::Good; hand::SEGMENT_COUNT];
         assert_eq!(lost_sensors(&health), None);
-        health[11] = ("no answer", false);
+        health[11] = Health::Starting;
         assert_eq!(
             lost_sensors(&health).as_deref(),
-            Some("sensor ring_middle (no answer)")
+            Some("sensor ring_middle (starting)")
         );
-        health = [("no answer", false); hand::SEGMENT_COUNT];
+        health = [Health::Starting; hand::SEGMENT_COUNT];
         assert!(lost_sensors(&health).unwrap().starts_with("16 of 16"));
     }
 }

@@ -225,8 +225,7 @@ mod tests {
         let imu = Imu {
             quaternion: [1.0, 0.0, 0.0, 0.0],
             stamp: at(us),
-            health: "good",
-            good: true,
+            health: glove::scan::Health::Good,
         };
         Record::Frame(Box::new(Frame {
             at: at(us),

@@ -85,7 +85,7 @@ fn frame_messages(frame: &Frame) -> Vec<(Channel, Value)> {
             let [w, x, y, z] = imu.quaternion;
             let sensor = json!({
                 "w": w, "x": x, "y": y, "z": z,
-                "time_us": imu.stamp.as_ticks(), "health": imu.health,
+                "time_us": imu.stamp.as_ticks(), "health": imu.health.to_string(),
             });
             ((*name).to_owned(), sensor)
         })

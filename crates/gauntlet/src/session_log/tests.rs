@@ -15,8 +15,7 @@ fn frame(sequence: u32) -> Record {
     let imu = Imu {
         quaternion: [1.0, 0.0, 0.0, 0.0],
         stamp: at(5),
-        health: "good",
-        good: true,
+        health: glove::scan::Health::Good,
     };
     Record::Frame(Box::new(Frame {
         at: at(10 + u64::from(sequence)),
