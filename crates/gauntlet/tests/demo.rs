@@ -1,5 +1,5 @@
 //! The whole demo, shortened: trains, starts both devices, drives one with the other, sums up.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 mod support;
 

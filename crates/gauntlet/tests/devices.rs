@@ -1,5 +1,5 @@
 //! `simulate` and `teleop` against each other, and ports on which nobody answers.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 mod support;
 

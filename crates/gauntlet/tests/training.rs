@@ -1,5 +1,5 @@
 //! `train` and `eval` on small data.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 mod support;
 

@@ -1,5 +1,5 @@
 //! Wrong files and wrong words: one clear line, a next step, exit code 1 or 2.
-#![allow(missing_docs)]
+#![allow(missing_docs, clippy::unwrap_used)]
 
 mod support;
 
