@@ -125,10 +125,10 @@ impl Host {
                 continue;
             }
             let mut bytes = core::mem::take(&mut self.heard);
-            let length = cobs::decode_in_place(&mut bytes).unwrap();
-            let (message, crc) = bytes[..length].split_last_chunk::<4>().unwrap();
+            let length = cobs::decode_in_place(&mut bytes).expect("COBS");
+            let (message, crc) = bytes[..length].split_last_chunk::<4>().expect("a CRC");
             assert_eq!(crc32(message), u32::from_le_bytes(*crc));
-            return Some(postcard::from_bytes(message).unwrap());
+            return Some(postcard::from_bytes(message).expect("a message"));
         }
         None
     }
@@ -140,7 +140,7 @@ impl Host {
             sequence,
             call,
         };
-        let message = postcard::to_slice(&request, &mut buffer).unwrap();
+        let message = postcard::to_slice(&request, &mut buffer).expect("room");
         let frame = framed(message);
         self.say(&frame);
     }
@@ -224,7 +224,7 @@ fn following() -> Host {
     bench.ready();
     let mut host = Host::new(bench).hello();
     for _ in 0..30 {
-        host.ask(Call::Engage).unwrap();
+        host.ask(Call::Engage).expect("taken");
         host.run(100 * MS);
     }
     assert_eq!(host.bench.state(), State::Following);
