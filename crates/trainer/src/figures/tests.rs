@@ -1,0 +1,97 @@
+//! Drawings are whole SVG files with their data beside them; nothing odd in the data stops them.
+
+use super::*;
+use crate::data::Matrix;
+use crate::random::Random;
+
+#[test]
+fn a_chart_draws_every_curve_and_leaves_its_data() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fig2.svg");
+    let curve = |name: &str, f: fn(f64) -> f64| Curve {
+        name: name.to_owned(),
+        points: (1..50).map(|i| (f64::from(i), f(f64::from(i)))).collect(),
+    };
+    let chart = Chart {
+        title: "d-Knn, SP1".to_owned(),
+        x_label: "epoch".to_owned(),
+        y_label: "d-Knn".to_owned(),
+        logarithmic: true,
+        ceiling: Some(1e4),
+        curves: vec![
+            curve("HAE (adap)", |x| 100.0 / x),
+            curve("Pin", |x| x * x),
+            curve("not a number", |_| f64::NAN),
+        ],
+    };
+    charts(&path, &[chart.clone(), Chart::default()]).unwrap();
+    let svg = std::fs::read_to_string(&path).unwrap();
+    assert!(svg.trim_end().ends_with("</svg>") && svg.contains("HAE (adap)"));
+    assert!(svg.matches("<polyline").count() >= 2);
+    let csv = std::fs::read_to_string(folder.path().join("fig2.csv")).unwrap();
+    assert!(csv.starts_with("chart,curve,x,y\n\"d-Knn, SP1\",HAE (adap),1,100\n"));
+    assert_eq!(csv.lines().count(), 1 + 3 * 49);
+}
+
+#[test]
+fn a_panel_joins_neighbours_and_numbers_its_marks() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("fig1.svg");
+    let points = Matrix::from_rows(&[[0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [0.0, 1.0, 1.0]]);
+    let panel = Panel {
+        title: "three".to_owned(),
+        grid: vec![[0, 0], [1, 0], [0, 1]],
+        heat: vec![0.0, 0.5, 1.0],
+        marks: points.clone(),
+        points,
+        ..Panel::default()
+    };
+    panels(&path, &[vec![panel, Panel::default()], vec![]]).unwrap();
+    let svg = std::fs::read_to_string(&path).unwrap();
+    // Two edges; the path of no points draws none.
+    assert_eq!(svg.matches("<polyline").count(), 2, "{svg}");
+    assert_eq!(svg.matches("<circle").count(), 3);
+    let csv = std::fs::read_to_string(folder.path().join("fig1.csv")).unwrap();
+    assert!(csv.contains("three,point,1,1,0,1,0.5\n") && csv.contains("three,mark,2,0,1,1,\n"));
+}
+
+#[test]
+fn a_folder_that_is_not_there_is_named() {
+    let said = charts(Path::new("/nowhere/fig.svg"), &[]).unwrap_err();
+    assert!(
+        said.to_string().contains("cannot write /nowhere/fig.svg"),
+        "{said}"
+    );
+}
+
+#[test]
+fn principal_axes_are_those_of_the_cloud() {
+    let mut random = Random::new(5, 0);
+    let rows: Vec<[f32; 3]> = (0..2000)
+        .map(|_| {
+            let (a, b, c) = (
+                3.0 * random.normal(),
+                random.normal(),
+                0.1 * random.normal(),
+            );
+            // Long along (1, 1, 0)/√2, then along z, thin along (1, −1, 0)/√2.
+            [(a + c) as f32 + 5.0, (a - c) as f32, b as f32]
+        })
+        .collect();
+    let samples = Matrix::from_rows(&rows);
+    let principal = Principal::of(&samples, 3);
+    let sum: f64 = principal.shares.iter().sum();
+    assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+    assert!(principal.shares[0] > 0.9 && principal.shares[2] < 0.01);
+    let projected = principal.project(&samples);
+    let along = f64::from(projected.row(0)[0]);
+    let mean = samples
+        .iter_rows()
+        .map(|row| f64::from(row[0] + row[1]))
+        .sum::<f64>()
+        / 2000.0;
+    let expected = (f64::from(rows[0][0] + rows[0][1]) - mean) / libm::sqrt(2.0);
+    assert!((along - expected).abs() < 0.05, "{along} {expected}");
+    let still = Principal::of(&Matrix::from_rows(&[[1.0, 2.0]; 3]), 2);
+    assert!(still.project(&samples).data.iter().all(|v| v.is_finite()));
+}
