@@ -143,7 +143,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 return Err(error.into());
             }
         };
-        let ours = self.individual.contains(&snapshot.echo);
+        let ours = self.individual.iter().any(|sent| *sent == snapshot.echo);
         self.is_individual |= ours && snapshot.status.going_to;
         if !self.is_individual {
             snapshot.status.echo = self.family.followed(&snapshot);
@@ -189,7 +189,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         if let Some(motion) = doing.motion {
             self.sent = Some(motion);
             if self.family.is_individual() {
-                self.individual.write(motion.position);
+                self.individual.note(motion.position);
             }
         }
         self.next_start = timing::after(now, self.config.cycle.max(timing::CYCLE));

@@ -1,15 +1,46 @@
 //! Whether an echoed position can be true: it was there before, or it was sent.
 
-use heapless::HistoryBuf;
+use heapless::Deque;
 
 /// Motions remembered: the echo may lag by the cycles that fit into a refresh, or a few lost ones.
 const SENT: usize = 8;
+
+/// The newest positions sent, each once in a row.
+#[derive(Debug)]
+pub(super) struct Recent<const X: usize>(Deque<[u8; X], SENT>);
+
+impl<const X: usize> Default for Recent<X> {
+    fn default() -> Self {
+        Self(Deque::new())
+    }
+}
+
+impl<const X: usize> Recent<X> {
+    pub(super) fn note(&mut self, position: [u8; X]) {
+        if self.newest() == Some(&position) {
+            return;
+        }
+        if self.0.is_full() {
+            self.0.pop_front();
+        }
+        // There is room now.
+        let _ = self.0.push_back(position);
+    }
+
+    pub(super) fn newest(&self) -> Option<&[u8; X]> {
+        self.0.back()
+    }
+
+    pub(super) fn iter(&self) -> impl Iterator<Item = &[u8; X]> {
+        self.0.iter()
+    }
+}
 
 /// What the gripper may echo.
 #[derive(Debug)]
 pub(super) struct EchoWatch<const X: usize> {
     known: Option<[u8; X]>,
-    sent: HistoryBuf<[u8; X], SENT>,
+    sent: Recent<X>,
     doubted: Option<[u8; X]>,
 }
 
@@ -17,7 +48,7 @@ impl<const X: usize> Default for EchoWatch<X> {
     fn default() -> Self {
         Self {
             known: None,
-            sent: HistoryBuf::new(),
+            sent: Recent::default(),
             doubted: None,
         }
     }
@@ -26,9 +57,7 @@ impl<const X: usize> Default for EchoWatch<X> {
 impl<const X: usize> EchoWatch<X> {
     /// These positions are in a command that leaves now.
     pub(super) fn note_sent(&mut self, position: [u8; X]) {
-        if self.sent.recent() != Some(&position) {
-            self.sent.write(position);
-        }
+        self.sent.note(position);
     }
 
     /// Takes `echo` as it is: while a task runs the gripper writes over its own registers.
@@ -51,9 +80,9 @@ impl<const X: usize> EchoWatch<X> {
         }
         self.doubted = None;
         self.known = Some(echo);
-        if self.sent.recent() == Some(&echo) {
+        if self.sent.newest() == Some(&echo) {
             // It has caught up: what was sent before is out of the question again.
-            self.sent = HistoryBuf::new();
+            self.sent = Recent::default();
         }
         true
     }

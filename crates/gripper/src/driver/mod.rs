@@ -27,10 +27,9 @@ pub use task::{Failure, Outcome, Task};
 use crate::registers::{three_finger::Mode, two_finger};
 use crate::{Duration, Gripper, Instant, Motion, Status, link, timing};
 use cycle::Doing;
-use echo::EchoWatch;
+use echo::{EchoWatch, Recent};
 use embedded_io::{Read, ReadReady, Write};
 use family::Snapshot;
-use heapless::HistoryBuf;
 use task::Running;
 
 /// What a driver needs to know about its line.
@@ -137,7 +136,7 @@ pub struct Driver<S, F, const X: usize> {
     /// The newest motion that left.
     sent: Option<Motion<X>>,
     /// Positions of the newest motions with every axis on its own.
-    individual: HistoryBuf<[u8; X], 8>,
+    individual: Recent<X>,
     /// The gripper has echoed one of them: every axis follows its own echo.
     is_individual: bool,
     /// Nothing is written before a read has been answered.
@@ -213,7 +212,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             echo: EchoWatch::default(),
             doing: None,
             sent: None,
-            individual: HistoryBuf::new(),
+            individual: Recent::default(),
             is_individual: false,
             verify: true,
             misses: 0,
@@ -226,7 +225,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
 
     /// From now on an axis may follow another's position again.
     fn forget_individual(&mut self) {
-        self.individual = HistoryBuf::new();
+        self.individual = Recent::default();
         self.is_individual = false;
     }
 

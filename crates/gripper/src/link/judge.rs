@@ -116,6 +116,18 @@ impl<S> Link<S> {
         Verdict::Wrong(Error::Stale)
     }
 
+    /// Forgets the first `count` bytes received.
+    pub(super) fn drop_front(&mut self, count: usize) {
+        let left = self.length.saturating_sub(count);
+        for at in 0..left {
+            let byte = self.received.get(at + count).copied().unwrap_or(0);
+            if let Some(slot) = self.received.get_mut(at) {
+                *slot = byte;
+            }
+        }
+        self.length = left;
+    }
+
     /// Takes a copy of the request off the front. `true` while the bytes may still become one.
     ///
     /// A read's reply differs from its request in the third byte (a byte count, where the request
@@ -134,8 +146,8 @@ impl<S> Link<S> {
         if bytes.len() < request.len() {
             return true;
         }
-        self.received.copy_within(request.len()..self.length, 0);
-        self.length -= request.len();
+        let echoed = request.len();
+        self.drop_front(echoed);
         self.echo = Echo::On;
         self.stripped = true;
         self.length == 0

@@ -152,8 +152,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
         self.trace.note(now, Event::Late, frame);
         self.counters.count(Error::Stale);
         self.owed.pay(owed);
-        self.received.copy_within(owed.length..self.length, 0);
-        self.length -= owed.length;
+        self.drop_front(owed.length);
         owed.length
     }
 

@@ -2,7 +2,7 @@
 
 use super::Error;
 use crate::Instant;
-use heapless::{HistoryBuf, Vec};
+use heapless::{Deque, Vec};
 
 /// Entries kept.
 pub const TRACE_LEN: usize = 32;
@@ -37,18 +37,22 @@ pub struct Entry {
 
 /// The last [`TRACE_LEN`] events of a link, oldest first.
 #[derive(Clone, Debug, Default)]
-pub struct Trace(HistoryBuf<Entry, TRACE_LEN>);
+pub struct Trace(Deque<Entry, TRACE_LEN>);
 
 impl Trace {
     pub(super) fn note(&mut self, at: Instant, event: Event, bytes: &[u8]) {
         let kept = bytes.get(..TRACE_BYTES).unwrap_or(bytes);
         let bytes = Vec::from_slice(kept).unwrap_or_default();
-        self.0.write(Entry { at, event, bytes });
+        if self.0.is_full() {
+            self.0.pop_front();
+        }
+        // There is room now.
+        drop(self.0.push_back(Entry { at, event, bytes }));
     }
 
     /// The entries, oldest first.
     pub fn iter(&self) -> impl Iterator<Item = &Entry> {
-        self.0.oldest_ordered()
+        self.0.iter()
     }
 }
 
