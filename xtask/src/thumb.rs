@@ -55,6 +55,11 @@ pub fn build_command(arguments: &[&str]) -> Result<Command, Failure> {
     }
 }
 
+/// Whether the toolchain in use has the target's library.
+pub fn is_installed() -> bool {
+    sysroot().is_some_and(|sysroot| has_core(&sysroot))
+}
+
 fn toolchain() -> Result<Toolchain, Failure> {
     let Some(sysroot) = sysroot() else {
         return Err("rustc --print sysroot gave no path; is rustc on the PATH?".into());
