@@ -2,6 +2,7 @@
 //! Time is virtual; [`run`] moves it from one event to the next.
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod ask;
 pub mod fuzz;
 
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};

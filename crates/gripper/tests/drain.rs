@@ -1,0 +1,151 @@
+//! What the link does with bytes nobody asked for, late replies and broken ports.
+#![allow(clippy::unwrap_used)]
+
+mod support;
+
+use gripper::link::{Config, Debt, Error, Event, Link, PortFault, Refused};
+use gripper::timing;
+use support::ask::*;
+use support::{CHARACTER, Line, at, run_link, settle};
+
+#[test]
+fn after_a_timeout_the_same_look_is_refused_and_another_is_not() {
+    let mut bench = Bench::new();
+    assert_eq!(
+        bench.ask(read(8), &[], CHARACTER),
+        Err(Error::Timeout { received: 0 })
+    );
+    settle(&bench.line, &mut bench.link);
+    let now = at(bench.line.now());
+    assert_eq!(
+        bench.link.start(&read(8), RESERVED, now),
+        Err(Refused::Owed)
+    );
+    assert_eq!(bench.link.debt(&read(8), now), Debt::Open);
+    assert_eq!(bench.link.debt(&exchange(8), now), Debt::None);
+    // A later answer settles it as far as order goes; time ends it altogether.
+    assert!(bench.ask(read(7), &status(7), CHARACTER).is_ok());
+    assert!(matches!(
+        bench.link.debt(&read(8), at(bench.line.now())),
+        Debt::Settled { .. }
+    ));
+    bench
+        .line
+        .set_now(bench.line.now() + timing::MEMORY.as_ticks());
+    assert_eq!(bench.link.debt(&read(8), at(bench.line.now())), Debt::None);
+}
+
+#[test]
+fn a_late_reply_is_stale_and_never_the_answer() {
+    let mut bench = Bench::new();
+    assert!(bench.ask(read(8), &[], CHARACTER).is_err());
+    // The late reply comes while the next request waits for its own.
+    assert_eq!(bench.ask(read(7), &status(8), CHARACTER), Err(Error::Stale));
+    // A late reply in the quarantine is recognised too, and pays its debt.
+    let mut bench = Bench::new();
+    assert!(bench.ask(exchange(8), &[], CHARACTER).is_err());
+    bench
+        .line
+        .send(bench.line.now() + 300, CHARACTER, &exchanged());
+    settle(&bench.line, &mut bench.link);
+    let counters = bench.link.counters();
+    assert_eq!((counters.stale, counters.noise), (1, 0));
+    assert_eq!(
+        bench.link.debt(&exchange(8), at(bench.line.now())),
+        Debt::None
+    );
+    assert!(
+        bench
+            .link
+            .trace()
+            .iter()
+            .any(|entry| entry.event == Event::Late && *entry.bytes == *exchanged())
+    );
+}
+
+#[test]
+fn bytes_on_an_idle_line_are_drained_before_anything_is_sent() {
+    let mut bench = Bench::new();
+    bench.line.send(bench.line.now(), 0, &status(8));
+    let now = at(bench.line.now());
+    assert_eq!(
+        bench.link.start(&read(8), RESERVED, now),
+        Err(Refused::Busy)
+    );
+    let began = bench.line.now();
+    settle(&bench.line, &mut bench.link);
+    assert!(bench.line.now() >= began + 1_750);
+    assert_eq!(bench.link.counters().noise, 21);
+    assert_eq!(bench.ask(read(8), &status(8), CHARACTER), Ok(status(8)));
+}
+
+#[test]
+fn what_lies_unread_when_the_port_is_opened_is_thrown_away() {
+    let line = Line::default();
+    line.send(0, 0, &status(8));
+    let mut link = Link::new(line.clone(), Config::new(9, 115_200));
+    settle(&line, &mut link);
+    assert_eq!((link.counters().noise, link.counters().replies), (21, 0));
+}
+
+#[test]
+fn silence_counts_from_the_last_poll_that_saw_bytes() {
+    let mut bench = Bench::new();
+    // A byte came long ago, but is seen only now.
+    bench.line.send(bench.line.now(), 0, &[0x55]);
+    bench.line.set_now(bench.line.now() + 50_000);
+    let seen = bench.line.now();
+    assert!(bench.link.poll(at(seen)).is_none());
+    settle(&bench.line, &mut bench.link);
+    assert!(bench.line.now() >= seen + 1_750);
+}
+
+#[test]
+fn a_line_that_never_falls_silent_is_an_error_again_and_again() {
+    let mut bench = Bench::new();
+    bench.line.send(bench.line.now(), CHARACTER, &[0xA5; 3_000]);
+    let (mut errors, mut thrown, end) = (0, 0, bench.line.now() + 3_000 * CHARACTER);
+    while bench.line.now() < end {
+        let until = bench.line.now() + 60_000;
+        match run_link(&bench.line, &mut bench.link, until, &mut |_, _, _| {}) {
+            Some(Err(Error::Noise(count))) => (errors, thrown) = (errors + 1, thrown + count),
+            other => assert!(bench.line.now() >= end, "{other:?}"),
+        }
+    }
+    assert!(
+        errors >= 4 && thrown > 2_000,
+        "{errors} errors, {thrown} bytes"
+    );
+    assert_eq!(bench.ask(read(8), &status(8), CHARACTER), Ok(status(8)));
+}
+
+#[test]
+fn bytes_after_a_valid_reply_do_not_spoil_it() {
+    let mut bench = Bench::new();
+    let mut reply = status(8);
+    reply.extend_from_slice(&[0xFF, 0x00]);
+    assert_eq!(bench.ask(read(8), &reply, 0), Ok(status(8)));
+    assert_eq!(bench.link.counters().noise, 2);
+    assert_eq!(bench.ask(read(8), &status(8), CHARACTER), Ok(status(8)));
+}
+
+#[test]
+fn a_broken_port_is_told_and_rested_and_comes_back() {
+    let mut bench = Bench::new();
+    bench.line.break_port(true);
+    let fault = PortFault::Read(embedded_io::ErrorKind::BrokenPipe);
+    let mut errors = 0;
+    let end = bench.line.now() + 1_000_000;
+    while bench.line.now() < end {
+        match run_link(&bench.line, &mut bench.link, end, &mut |_, _, _| {}) {
+            Some(outcome) => {
+                assert_eq!(outcome, Err(Error::Port(fault)));
+                errors += 1;
+            }
+            None => break,
+        }
+    }
+    assert!((8..=11).contains(&errors), "{errors} in a second");
+    bench.line.break_port(false);
+    assert_eq!(bench.ask(read(8), &status(8), CHARACTER), Ok(status(8)));
+}
