@@ -181,7 +181,9 @@ impl<S: Read + ReadReady + Write> Server<S> {
         R: Gripper<X>,
         F: Slot,
     {
-        let &Request { session, sequence, .. } = request;
+        let &Request {
+            session, sequence, ..
+        } = request;
         let is_hello = matches!(request.call, Call::Hello { .. });
         if self.answered == Some((session, sequence)) && !is_hello {
             // The reply was lost: the request was done already, and is not done twice.
