@@ -2,65 +2,19 @@
 //! pseudo-terminal, in real time.
 #![allow(clippy::unwrap_used)]
 
-use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
+mod port;
+
 use gripper::driver::{Config, ThreeFinger};
 use gripper::link::{self, Error, Link};
 use gripper::registers::{COMMAND, STATUS, three_finger};
 use gripper::rtu::{Exception, Registers, Request, Response};
-use gripper::{Activation, Duration, Gripper, Instant, Motion};
-use std::collections::VecDeque;
+use gripper::{Activation, Duration, Gripper, Motion};
+use port::{Port, Timer};
 use std::future::{Ready, ready};
 use std::sync::{Arc, Mutex};
 use tokio_modbus::prelude::{ExceptionCode, SlaveRequest};
 use tokio_modbus::server::Service;
 use tokio_serial::SerialStream;
-
-/// Our end of the pseudo-terminal as a port that never blocks.
-struct Port {
-    stream: SerialStream,
-    read: VecDeque<u8>,
-}
-
-fn other(error: &std::io::Error) -> ErrorKind {
-    println!("port: {error}");
-    ErrorKind::Other
-}
-
-impl ErrorType for Port {
-    type Error = ErrorKind;
-}
-
-impl ReadReady for Port {
-    fn read_ready(&mut self) -> Result<bool, ErrorKind> {
-        let mut bytes = [0; 64];
-        match self.stream.try_read(&mut bytes) {
-            Ok(count) => self.read.extend(&bytes[..count]),
-            Err(error) if error.kind() == std::io::ErrorKind::WouldBlock => {}
-            Err(error) => return Err(other(&error)),
-        }
-        Ok(!self.read.is_empty())
-    }
-}
-
-impl Read for Port {
-    fn read(&mut self, out: &mut [u8]) -> Result<usize, ErrorKind> {
-        let count = out.len().min(self.read.len());
-        for (slot, byte) in out.iter_mut().zip(self.read.drain(..count)) {
-            *slot = byte;
-        }
-        Ok(count)
-    }
-}
-
-impl Write for Port {
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, ErrorKind> {
-        self.stream.try_write(bytes).map_err(|error| other(&error))
-    }
-
-    fn flush(&mut self) -> Result<(), ErrorKind> {
-        Ok(())
-    }
-}
 
 /// The peer's registers: a command block and a status block of 8.
 #[derive(Default)]
@@ -165,29 +119,10 @@ fn with_peer<T, F: Future<Output = T>>(test: impl FnOnce(Port, Arc<Mutex<Memory>
         let memory = Arc::new(Mutex::new(Memory::default()));
         let server = tokio_modbus::server::rtu::Server::new(theirs);
         let serving = tokio::spawn(server.serve_forever(Peer(memory.clone())));
-        let outcome = test(
-            Port {
-                stream: ours,
-                read: VecDeque::new(),
-            },
-            memory,
-        )
-        .await;
+        let outcome = test(Port::new(ours), memory).await;
         serving.abort();
         outcome
     })
-}
-
-struct Timer(std::time::Instant);
-
-impl Timer {
-    fn now(&self) -> Instant {
-        Instant::from_ticks(self.0.elapsed().as_micros() as u64)
-    }
-
-    async fn rest(&self) {
-        tokio::time::sleep(std::time::Duration::from_millis(1)).await;
-    }
 }
 
 /// Asks once; what comes back as a frame of slave 9.
@@ -222,7 +157,7 @@ const PATIENCE: Duration = Duration::from_millis(1_000);
 #[test]
 fn every_function_code_works_against_tokio_modbus() {
     with_peer(|port, memory| async move {
-        let timer = Timer(std::time::Instant::now());
+        let timer = Timer::start();
         let config = link::Config {
             response: PATIENCE,
             ..link::Config::new(9, 115_200)
@@ -294,7 +229,7 @@ fn every_function_code_works_against_tokio_modbus() {
 #[test]
 fn the_driver_runs_its_cycle_against_tokio_modbus() {
     with_peer(|port, memory| async move {
-        let timer = Timer(std::time::Instant::now());
+        let timer = Timer::start();
         memory.lock().unwrap().status = [
             0xF1FF, 0x0000, 0x0600, 0x0006, 0x0000, 0x0600, 0x0089, 0x0000,
         ];

@@ -129,3 +129,45 @@ impl Owed {
         self.0.iter().map(|entry| entry.until).min()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::registers::STATUS;
+
+    fn look(quantity: u16) -> Signature {
+        let address = STATUS;
+        Signature::of(9, &Request::ReadHolding { address, quantity })
+    }
+
+    fn at(us: u64) -> Instant {
+        Instant::from_ticks(us)
+    }
+
+    #[test]
+    fn a_late_reply_settles_what_was_asked_before_it_and_nothing_else() {
+        let mut owed = Owed::default();
+        for (quantity, sent) in [(8, 1), (7, 2), (6, 3)] {
+            owed.add(look(quantity), at(sent), at(sent + 10));
+        }
+        owed.pay(look(7));
+        assert!(matches!(owed.debt(look(8)), Debt::Settled { .. }));
+        assert_eq!(owed.debt(look(7)), Debt::None);
+        assert_eq!(owed.debt(look(6)), Debt::Open);
+        // Paying twice changes nothing.
+        owed.pay(look(7));
+        assert_eq!(owed.debt(look(6)), Debt::Open);
+    }
+
+    #[test]
+    fn a_full_table_hides_no_debt() {
+        let mut owed = Owed::default();
+        for quantity in 1..=ENTRIES as u16 {
+            owed.add(look(quantity), at(1), at(1));
+        }
+        assert_eq!(owed.debt(look(100)), Debt::Open);
+        owed.expire(timing::after(at(1), timing::MEMORY));
+        assert_eq!(owed.debt(look(100)), Debt::None);
+        assert_eq!(owed.earliest(), None);
+    }
+}
