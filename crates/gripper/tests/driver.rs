@@ -101,11 +101,14 @@ fn a_fresh_motion_goes_out_as_one_read_write_and_a_stale_one_does_not() {
 }
 
 #[test]
-fn a_gripper_that_is_not_ready_is_never_written_to() {
-    for first in [0x00, 0x11, 0x21, 0x01] {
+fn a_gripper_that_is_not_ready_or_in_a_major_fault_is_never_written_to() {
+    // Not active, activating, changing mode, active but reset; ready, with a fault that holds it.
+    let not_ready = [0x00, 0x11, 0x21, 0x01].map(|first| (first, 0));
+    let held = [0x0B, 0x0C, 0x0D, 0x0E, 0x0F].map(|fault| (0xF1, fault));
+    for (first, fault) in not_ready.into_iter().chain(held) {
         let (line, mut gripper) = gripper();
         let mut slave = Slave::three_finger();
-        slave.status[0] = first;
+        (slave.status[0], slave.status[2]) = (first, fault);
         for _ in 0..20 {
             gripper.set_motion(Some(HALF), at(line.now()));
             let status = run_gripper(
@@ -116,9 +119,29 @@ fn a_gripper_that_is_not_ready_is_never_written_to() {
                     slave.serve(line, end, request);
                 },
             );
-            assert_ne!(status.unwrap().unwrap().activation, Activation::Ready);
+            let status = status.unwrap().unwrap();
+            assert_eq!(status.activation == Activation::Ready, first == 0xF1);
         }
-        assert_eq!(slave.writes, 0, "status byte {first:02X}");
+        assert_eq!(
+            slave.writes, 0,
+            "status byte {first:02X}, fault {fault:02X}"
+        );
+    }
+    // A fault that only tells of a command not carried out does not keep the next one.
+    for fault in [0x05, 0x06, 0x07, 0x09, 0x0A] {
+        let (line, mut gripper) = gripper();
+        let mut slave = Slave::three_finger();
+        slave.status[2] = fault;
+        for _ in 0..5 {
+            gripper.set_motion(Some(HALF), at(line.now()));
+            run_gripper(
+                &line,
+                &mut gripper,
+                line.now() + 100_000,
+                &mut |line, end, request| slave.serve(line, end, request),
+            );
+        }
+        assert_eq!(slave.writes, 4, "fault {fault:02X}");
     }
 }
 

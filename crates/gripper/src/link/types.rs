@@ -144,7 +144,7 @@ impl core::error::Error for Error {}
 /// Why a request was not sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refused {
-    /// A transaction, a drain or a silence is under way; ask again at [`Link::next_due`].
+    /// A transaction, a drain or a silence is under way; ask again at [`next_due`](super::Link::next_due).
     Busy,
     /// A late reply could be taken for the answer: send one of another look, or wait.
     Owed,
