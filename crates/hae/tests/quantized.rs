@@ -27,12 +27,12 @@ fn words(image: &[u8]) -> Vec<u32> {
 
 fn check<const Q: usize, const H: usize, const X: usize>(seed: u64) {
     let network = Network::random(seed, [Q, H, X]);
-    let poses = poses(seed + 1, Q, 60);
+    let poses = poses(seed + 1, Q, if cfg!(miri) { 2 } else { 60 });
     let image = quantise(&network, &poses);
     let map = Map::<Q, H, X>::from_image(&image).expect("a sound image");
     assert_eq!(map.element(), Element::I16);
     let (words, rng) = (words(&image), &mut rng(seed + 2));
-    for sample in 0..300 {
+    for sample in 0..if cfg!(miri) { 2 } else { 300 } {
         let mut q: [f32; Q] = vector(rng, Q, -2.0, 2.0).try_into().expect("Q values");
         let edges = [
             0.0,
@@ -70,7 +70,8 @@ fn check<const Q: usize, const H: usize, const X: usize>(seed: u64) {
     for x in 0..X {
         let relative = measured[x] / (high[x] - low[x]);
         println!("{Q}x{H}x{X} output {x}: {relative:.2e} of its range");
-        assert!(relative <= 1e-3, "{relative}");
+        // Two poses say nothing about a range.
+        assert!(relative <= 1e-3 || cfg!(miri), "{relative}");
     }
 }
 
@@ -87,7 +88,7 @@ fn every_size_has_the_reference_bits_and_a_small_stated_error() {
 #[test]
 fn every_flipped_bit_is_refused() {
     let mut image = quantise(&Network::random(7, [3, 7, 2]), &poses(8, 3, 5));
-    for bit in 0..image.len() * 8 {
+    for bit in (0..image.len() * 8).step_by(if cfg!(miri) { 97 } else { 1 }) {
         image[bit / 8] ^= 1 << (bit % 8);
         assert!(parse(&image).is_err(), "bit {bit}");
         image[bit / 8] ^= 1 << (bit % 8);

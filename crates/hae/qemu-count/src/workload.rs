@@ -36,12 +36,26 @@ impl Random {
 
 /// Fills parameters with the spread of a trained hand map. Every eleventh bias is a negative zero, every seventh weight
 /// a denormal.
-pub fn parameters(random: &mut Random, w1: &mut [f32], b1: &mut [f32], w2: &mut [f32], b2: &mut [f32]) {
+pub fn parameters(
+    random: &mut Random,
+    w1: &mut [f32],
+    b1: &mut [f32],
+    w2: &mut [f32],
+    b2: &mut [f32],
+) {
     for (n, w) in w1.iter_mut().enumerate() {
-        *w = if n % 7 == 6 { random.signed(1e-39) } else { random.signed(0.3) };
+        *w = if n % 7 == 6 {
+            random.signed(1e-39)
+        } else {
+            random.signed(0.3)
+        };
     }
     for (n, b) in b1.iter_mut().enumerate() {
-        *b = if n % 11 == 10 { -0.0 } else { random.signed(0.2) };
+        *b = if n % 11 == 10 {
+            -0.0
+        } else {
+            random.signed(0.2)
+        };
     }
     w2.iter_mut().for_each(|w| *w = random.signed(12.0));
     b2.iter_mut().for_each(|b| *b = 127.5 + random.signed(10.0));

@@ -112,11 +112,11 @@ macro_rules! kernel {
     };
 }
 
-kernel!(sse2, "sse2", __m128, width 4, tile 2,
+kernel!(sse2, "sse2", __m128, width 4, tile 3,
     _mm_load_ps, _mm_set1_ps, _mm_setzero_ps, _mm_mul_ps, _mm_add_ps, _mm_max_ps, tree_128);
 kernel!(avx2, "avx2", __m256, width 8, tile 6,
     _mm256_load_ps, _mm256_set1_ps, _mm256_setzero_ps, _mm256_mul_ps, _mm256_add_ps, _mm256_max_ps, tree_256);
-kernel!(avx512, "avx512f", __m512, width 16, tile 2,
+kernel!(avx512, "avx512f", __m512, width 16, tile 3,
     _mm512_load_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_mul_ps, _mm512_add_ps, _mm512_max_ps, tree_512);
 
 /// The halving tree over four vectors of four lanes.
