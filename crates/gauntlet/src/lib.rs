@@ -5,6 +5,7 @@
 //! | [`cli`], [`commands`] | the command line and its verbs |
 //! | [`failure`], [`out`], [`tell`], [`progress`] | what a person reads |
 //! | [`port`], [`ports`], [`probe`] | serial ports: open, list, is anybody there |
+//! | [`line`], [`tcp`] | a gripper's line: a serial port or Modbus TCP |
 //! | [`platform`], [`slots`], [`session`] | the bridge on a PC: clock and wait, weights, thread and queues |
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
@@ -14,6 +15,7 @@ pub mod cli;
 pub mod commands;
 pub mod failure;
 pub mod interrupt;
+pub mod line;
 pub mod live;
 pub mod model;
 pub mod out;
@@ -30,6 +32,7 @@ pub mod session;
 pub mod session_log;
 pub mod slots;
 pub mod stats;
+pub mod tcp;
 pub mod tell;
 pub mod training;
 pub mod words;

@@ -423,6 +423,37 @@ pub struct Watch {
 }
 
 impl Watch {
+    /// A watch on a line that is no serial port: its name, and what becomes readable when an answer is there.
+    pub(crate) fn of(name: PathBuf, readable: Arc<OwnedFd>) -> Self {
+        let shared = Shared {
+            path: name,
+            baud: 0,
+            descriptor: Mutex::new(Some(readable)),
+            reads: AtomicU64::new(0),
+            replacement: Mutex::new(None),
+            replaced: AtomicBool::new(false),
+            closed: AtomicBool::new(false),
+            losses: AtomicU64::new(0),
+        };
+        Self {
+            shared: Arc::new(shared),
+        }
+    }
+
+    /// The line's driver has read.
+    pub(crate) fn note_read(&self) {
+        self.shared.reads.fetch_add(1, Ordering::Relaxed);
+    }
+
+    /// The line is there (`Some`) or away.
+    pub(crate) fn set_descriptor(&self, readable: Option<Arc<OwnedFd>>) {
+        let mut descriptor = lock(&self.shared.descriptor);
+        if descriptor.is_some() && readable.is_none() {
+            self.shared.losses.fetch_add(1, Ordering::Relaxed);
+        }
+        *descriptor = readable;
+    }
+
     /// The path it was opened by.
     pub fn path(&self) -> &Path {
         &self.shared.path

@@ -10,6 +10,7 @@ use gripper::{Gripper, Status};
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::line::{Line, Settings};
 use crate::platform::Clock;
 use crate::port::{BAUD, Port};
 use crate::record::AXES;
@@ -125,13 +126,13 @@ fn because(error: gripper::Error) -> String {
     }
 }
 
-/// Opens the gripper's port and reads its status.
+/// Opens the gripper's line, a serial port or `tcp:HOST[:PORT]`, and reads its status.
 ///
 /// # Errors
 /// A failure that says whether the port does not open or nobody answers on it, and what to try.
-pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Port, Status<AXES>)> {
-    let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
-    let config = gripper::driver::Config::for_pc();
+pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Line, Status<AXES>)> {
+    let mut port = Line::open(path, Settings::default(), interrupt)?;
+    let config = port.driver_config(Settings::default());
     let unit = config.unit;
     let clock = Clock::start();
     let end = Instant::now() + GRIPPER_WAIT;
@@ -146,6 +147,16 @@ pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Port, Status<
             Some(Err(error)) => last_error = Some(error),
             None => {}
         }
+    }
+    if let Some(error) = port.error() {
+        return Err(Failure::new(
+            format!(
+                "no gripper answers at {} as unit {unit}: {error}",
+                path.display()
+            ),
+            error.next_step(),
+        )
+        .into());
     }
     let why = last_error.map_or_else(String::new, because);
     Err(Failure::new(

@@ -19,13 +19,14 @@ use gripper::{Duration, Instant};
 
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
+use crate::line::{Line, Settings};
 use crate::platform::{Clock, Pc};
 use crate::port::{BAUD, Port, Watch};
 use crate::record::{AXES, Command, Frame, Imu, Record, Sort};
 use crate::slots::MemorySlot;
 
 /// The bridge as a PC runs it.
-pub type PcApp = App<Pc, Port, ThreeFinger<Port>, MemorySlot, AXES>;
+pub type PcApp = App<Pc, Port, ThreeFinger<Line>, MemorySlot, AXES>;
 
 /// Orders that may wait; the loop takes them every 10 ms.
 const ORDERS: usize = 64;
@@ -59,8 +60,8 @@ pub type Snapshot = Telemetry<AXES>;
 pub struct Parts {
     /// The glove's port.
     pub glove: Port,
-    /// The gripper's port.
-    pub gripper: Port,
+    /// The gripper's line.
+    pub gripper: Line,
     /// The weights image.
     pub image: Vec<u8>,
     /// The bridge's configuration.
@@ -117,7 +118,8 @@ impl Session {
                         ..scan::Config::default()
                     },
                 );
-                let gripper = ThreeFinger::new(parts.gripper, gripper::driver::Config::for_pc());
+                let config = parts.gripper.driver_config(Settings::default());
+                let gripper = ThreeFinger::new(parts.gripper, config);
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
                 worker.run(&mut app);
                 Ok(())
@@ -232,7 +234,6 @@ struct Ending {
 #[derive(Default)]
 struct Seen {
     frame: u32,
-    answers: u32,
     sent: u32,
     status: u32,
     /// Oldest sample of the newest command that followed the hand.
@@ -287,11 +288,8 @@ impl Worker {
 
     fn hand_over(&mut self, app: &mut PcApp) {
         let telemetry = *app.telemetry();
-        let answers = telemetry.counters.answered_frames;
         if telemetry.frame_sequence != self.seen.frame {
-            let answered = answers != self.seen.answers;
-            let answered = telemetry.state.is_moving().then_some(answered);
-            if let Some(frame) = frame_record(&telemetry, answered) {
+            if let Some(frame) = frame_record(&telemetry) {
                 self.send(Record::Frame(Box::new(frame)));
             }
         }
@@ -314,7 +312,6 @@ impl Worker {
         }
         self.seen = Seen {
             frame: telemetry.frame_sequence,
-            answers,
             sent: telemetry.sent_sequence,
             stamp: telemetry
                 .sent
@@ -366,7 +363,7 @@ fn sort(kind: &Kind) -> Sort {
     if fault { Sort::Fault } else { Sort::Note }
 }
 
-fn frame_record(telemetry: &Telemetry<AXES>, answered: Option<bool>) -> Option<Frame> {
+fn frame_record(telemetry: &Telemetry<AXES>) -> Option<Frame> {
     let frame = telemetry.frame.as_ref()?;
     let imus = frame.samples.map(|sample| {
         let quaternion = sample.orientation.as_ref();
@@ -383,6 +380,6 @@ fn frame_record(telemetry: &Telemetry<AXES>, answered: Option<bool>) -> Option<F
         angles: telemetry.angles,
         angles_valid: telemetry.angles_valid,
         map_output: telemetry.map_output,
-        answered,
+        following: telemetry.state.is_moving(),
     })
 }

@@ -1,0 +1,133 @@
+//! A gripper's line: a serial port, or Modbus TCP. The driver does not care which.
+
+use std::path::Path;
+
+use anyhow::Result;
+
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::port::{self, BAUD, Watch};
+use crate::tcp;
+
+/// What differs from a gripper as it is delivered.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Settings {
+    /// Modbus unit; 9 on a serial line and 2 over TCP as delivered.
+    pub unit: Option<u8>,
+    /// Speed of a serial line, baud; 115200 as delivered.
+    pub baud: Option<u32>,
+}
+
+/// The way to a gripper.
+#[derive(Debug)]
+pub enum Line {
+    /// A serial port.
+    Serial(port::Port),
+    /// Modbus TCP.
+    Tcp(tcp::Port),
+}
+
+impl Line {
+    /// Opens `path`: a serial port's path, or `tcp:HOST[:PORT]`. Nothing is asked of the gripper.
+    ///
+    /// # Errors
+    /// A failure that says why it does not open.
+    pub fn open(path: &Path, settings: Settings, interrupt: &Interrupt) -> Result<Self> {
+        Ok(match tcp::Address::parse(path)? {
+            Some(address) => {
+                let unit = settings.unit.unwrap_or(tcp::UNIT);
+                Self::Tcp(tcp::Port::connect(&address, unit, interrupt)?)
+            }
+            None => {
+                let baud = settings.baud.unwrap_or(BAUD);
+                Self::Serial(port::Port::open(path, baud).map_err(Failure::from)?)
+            }
+        })
+    }
+
+    /// How to set up a driver on this line.
+    pub fn driver_config(&self, settings: Settings) -> gripper::driver::Config {
+        match self {
+            Self::Serial(_) => {
+                let usual = gripper::driver::Config::for_pc();
+                gripper::driver::Config {
+                    unit: settings.unit.unwrap_or(usual.unit),
+                    baud: settings.baud.unwrap_or(BAUD),
+                    ..usual
+                }
+            }
+            Self::Tcp(port) => port.driver_config(),
+        }
+    }
+
+    /// What is wrong with the line itself, where it can tell better than the driver.
+    pub fn error(&self) -> Option<tcp::Error> {
+        match self {
+            Self::Serial(_) => None,
+            Self::Tcp(port) => port.error(),
+        }
+    }
+
+    /// A handle to wait on it and to see how it fares.
+    pub fn watch(&self) -> Watch {
+        match self {
+            Self::Serial(port) => port.watch(),
+            Self::Tcp(port) => port.watch(),
+        }
+    }
+}
+
+/// A line's failure.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// Of the serial port.
+    #[error(transparent)]
+    Serial(#[from] port::Error),
+    /// Of Modbus TCP.
+    #[error(transparent)]
+    Tcp(#[from] tcp::Error),
+}
+
+impl embedded_io::Error for Error {
+    fn kind(&self) -> embedded_io::ErrorKind {
+        match self {
+            Self::Serial(error) => error.kind(),
+            Self::Tcp(error) => error.kind(),
+        }
+    }
+}
+
+impl embedded_io::ErrorType for Line {
+    type Error = Error;
+}
+
+impl embedded_io::ReadReady for Line {
+    fn read_ready(&mut self) -> Result<bool, Error> {
+        Ok(match self {
+            Self::Serial(port) => port.read_ready()?,
+            Self::Tcp(port) => port.read_ready()?,
+        })
+    }
+}
+
+impl embedded_io::Read for Line {
+    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Error> {
+        Ok(match self {
+            Self::Serial(port) => port.read(buffer)?,
+            Self::Tcp(port) => port.read(buffer)?,
+        })
+    }
+}
+
+impl embedded_io::Write for Line {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize, Error> {
+        Ok(match self {
+            Self::Serial(port) => port.write(bytes)?,
+            Self::Tcp(port) => port.write(bytes)?,
+        })
+    }
+
+    fn flush(&mut self) -> Result<(), Error> {
+        Ok(())
+    }
+}

@@ -1,0 +1,126 @@
+//! Modbus TCP: the 3-Finger gripper's network variant (unit 2, FC04 reads, FC16 writes, port 502).
+//!
+//! A task on tokio, on a thread of its own, speaks Modbus TCP; [`Port`] hands it 16-byte command blocks and takes
+//! 16-byte status blocks back through bounded queues, and looks like a serial port to
+//! [`gripper::driver::ThreeFinger`]. So everything the driver promises (connecting only reads, no motion older than
+//! 100 ms, activation only when told) holds here too, and the bridge does not care which line it has.
+//!
+//! What TCP adds: an exchange is a write and a read, with one deadline for both ([`EXCHANGE`]); after it the
+//! connection is dropped with whatever it still holds, never resumed: a command that hangs in a network must not
+//! arrive later. A block that was handed over for one connection never leaves on the next.
+
+mod address;
+mod port;
+mod task;
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+pub use address::Address;
+pub use port::Port;
+
+/// Modbus unit of the 3-Finger gripper's TCP variant.
+pub const UNIT: u8 = 2;
+/// Modbus TCP's port.
+pub const PORT: u16 = 502;
+/// Bytes of a block.
+pub const BLOCK: usize = gripper::registers::three_finger::BLOCK;
+
+/// For one exchange: a block written, a block read.
+pub const EXCHANGE: Duration = Duration::from_millis(200);
+/// For the name's address and the connection.
+pub const CONNECT: Duration = Duration::from_secs(2);
+/// Pause before the first attempt to connect again; doubles up to [`RECONNECT_LAST`].
+pub const RECONNECT_FIRST: Duration = Duration::from_millis(100);
+/// Longest pause between two attempts.
+pub const RECONNECT_LAST: Duration = Duration::from_secs(2);
+
+/// What a Modbus TCP line cannot do.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum Error {
+    /// The name has no address.
+    #[error("the name {0} has no address")]
+    Name(String),
+    /// Nobody listens there.
+    #[error("the connection is refused: nothing listens on that port")]
+    Refused,
+    /// No connection in time.
+    #[error("no connection within {} s", CONNECT.as_secs())]
+    Unreachable,
+    /// There is no connection at the moment.
+    #[error("not connected")]
+    NotConnected,
+    /// No whole answer in time.
+    #[error("connected, but no answer within {} ms", EXCHANGE.as_millis())]
+    Timeout,
+    /// The other side ended the connection.
+    #[error("the other side closed the connection")]
+    Closed,
+    /// What came is no Modbus TCP frame: its header or length is impossible.
+    #[error("what came is no valid Modbus TCP frame ({0})")]
+    Malformed(String),
+    /// A valid frame that does not answer the request.
+    #[error("a valid frame does not answer the request ({0})")]
+    Mismatch(String),
+    /// The gripper, or a gateway before it, says no.
+    #[error("the device refuses with exception {0:02X}")]
+    Exception(u8),
+    /// A request that is neither a status read nor a command block.
+    #[error("only whole command and status blocks go over Modbus TCP")]
+    Unsupported,
+    /// The system's words.
+    #[error("{0}")]
+    System(String),
+}
+
+impl Error {
+    /// What a person can do about it.
+    pub fn next_step(&self) -> &'static str {
+        match self {
+            Self::Name(_) => "the gripper's IP address (192.168.1.11 as delivered)",
+            Self::Refused => {
+                "whether this is the gripper's address, and its Modbus TCP port (502 by default)"
+            }
+            Self::Unreachable | Self::System(_) => {
+                "`ping` the gripper; its power, the network cable, and that the PC has an address in the same network"
+            }
+            Self::Timeout => "--unit: another unit number (2 by default); the gripper's power",
+            Self::NotConnected | Self::Closed => {
+                "ending other programs that are connected to the gripper, then again"
+            }
+            Self::Malformed(_) | Self::Mismatch(_) | Self::Unsupported => {
+                "whether this address and port belong to the gripper"
+            }
+            Self::Exception(_) => "--unit, and whether this is a 3-Finger gripper",
+        }
+    }
+}
+
+impl embedded_io::Error for Error {
+    fn kind(&self) -> embedded_io::ErrorKind {
+        use embedded_io::ErrorKind;
+        match self {
+            Self::Name(_) | Self::NotConnected => ErrorKind::NotConnected,
+            Self::Refused => ErrorKind::ConnectionRefused,
+            Self::Unreachable | Self::Timeout => ErrorKind::TimedOut,
+            Self::Closed => ErrorKind::ConnectionReset,
+            Self::Malformed(_) | Self::Mismatch(_) => ErrorKind::InvalidData,
+            Self::Unsupported => ErrorKind::Unsupported,
+            Self::Exception(_) | Self::System(_) => ErrorKind::Other,
+        }
+    }
+}
+
+/// How a line fares, as far as both sides of the queues need to know.
+#[derive(Debug, Default)]
+struct State {
+    connected: bool,
+    /// The newest failure since the last good answer.
+    error: Option<Error>,
+    connections: u64,
+}
+
+fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
+    // Nothing panics while holding these; a poisoned lock still holds a valid value.
+    mutex.lock().unwrap_or_else(PoisonError::into_inner)
+}
