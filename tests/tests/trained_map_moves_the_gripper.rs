@@ -161,6 +161,10 @@ fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
     assert_eq!(counters.late_steps, 0);
     assert_eq!(counters.unusable_frames, 0);
     assert!(
+        counters.following_frames - counters.answered_frames <= 1,
+        "{counters:?}"
+    );
+    assert!(
         counters.answered_frames >= 20 * 3 * SETTLE as u32 / 1_000_000,
         "{counters:?}"
     );

@@ -84,7 +84,9 @@ pub struct Counters {
     pub worst_late_us: u32,
     /// Frames that gave no angles (lost sensors) or were refused by the map.
     pub unusable_frames: u32,
-    /// Frames that were answered, in the step that took them, with a command that follows the hand.
+    /// Frames that the gripper was to follow: a command that rests on each of them is due.
+    pub following_frames: u32,
+    /// Of those, frames of which such a command left.
     pub answered_frames: u32,
     /// Cycles of the gripper that ended in an error.
     pub gripper_errors: u32,
@@ -152,6 +154,10 @@ impl<const X: usize> Telemetry<X> {
         self.sent_sequence = self.sent_sequence.wrapping_add(1);
         if sent.follows {
             self.latency = sent.at.checked_duration_since(sent.stamp);
+            let known = |before: Sent<X>| before.follows && before.stamp >= sent.stamp;
+            if !self.sent.is_some_and(known) {
+                bump(&mut self.counters.answered_frames);
+            }
         }
         self.sent = Some(sent);
     }

@@ -220,7 +220,7 @@ where
         counters.gripper = self.gripper.counters();
         bump(&mut counters.steps);
         if fresh && self.order.is_some_and(|order| order.follows) {
-            bump(&mut counters.answered_frames);
+            bump(&mut counters.following_frames);
         }
         if let Some(late) = output.late {
             bump(&mut counters.late_steps);

@@ -214,7 +214,9 @@ pub enum SlotContents {
 pub struct Counters {
     /// Frames taken from the glove.
     pub frames: u32,
-    /// Frames answered, in the step that took them, with a command that follows the hand.
+    /// Frames that the gripper was to follow.
+    pub following_frames: u32,
+    /// Of those, frames of which a command left.
     pub answered_frames: u32,
     /// Frames that gave no angles or were refused by the map.
     pub unusable_frames: u32,

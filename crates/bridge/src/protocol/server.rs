@@ -400,6 +400,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         let host = self.decoder.counters();
         Counters {
             frames: seen.frame_sequence,
+            following_frames: seen.counters.following_frames,
             answered_frames: seen.counters.answered_frames,
             unusable_frames: seen.counters.unusable_frames,
             commands: seen.sent_sequence,
