@@ -157,13 +157,7 @@ impl Laboratory {
     /// [`Error`].
     pub fn run(&self, cell: &Cell, stop: &dyn Fn() -> bool) -> Result<Outcome, Error> {
         let mut prepared = self.prepare(cell)?;
-        let fail = |source| match source {
-            algorithm::Error::Stopped { .. } => Error::Stopped,
-            source => Error::Training {
-                cell: cell.slug(),
-                source,
-            },
-        };
+        let fail = |source| failure(cell, source);
         let mut trainer =
             Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
         let mut trace = Vec::new();
@@ -187,6 +181,45 @@ impl Laboratory {
             }
         }
         Ok(outcome(cell, &prepared, &trainer, trace, seconds))
+    }
+}
+
+/// f and the pairs, both in network units, at the end of a stage.
+pub type Stage = (Network<f32>, Pairs);
+
+impl Laboratory {
+    /// f and the pairs at the end of each stage of a cell: L early ones, then the last (Figure 3).
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn stages(&self, cell: &Cell, stop: &dyn Fn() -> bool) -> Result<Vec<Stage>, Error> {
+        let mut prepared = self.prepare(cell)?;
+        let each = cell.schedule.plan().stage_epochs.max(1);
+        prepared.settings.report_every = each;
+        let fail = |source| failure(cell, source);
+        let mut trainer =
+            Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
+        let mut stages = Vec::new();
+        for stage in 0..=cell.pairs {
+            let pause = (stage < cell.pairs).then_some((stage + 1) * each);
+            match train_until(&mut trainer, &mut prepared, pause, stop) {
+                Ok(()) => {}
+                Err(algorithm::Error::Stopped { epoch }) if Some(epoch) == pause => {}
+                Err(error) => return Err(fail(error)),
+            }
+            stages.push((trainer.networks().f, trainer.pairs().clone()));
+        }
+        Ok(stages)
+    }
+}
+
+fn failure(cell: &Cell, source: algorithm::Error) -> Error {
+    match source {
+        algorithm::Error::Stopped { .. } => Error::Stopped,
+        source => Error::Training {
+            cell: cell.slug(),
+            source,
+        },
     }
 }
 

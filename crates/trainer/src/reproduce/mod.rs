@@ -1,13 +1,16 @@
 //! The paper's experiments as a list of cells: a data set, a row of Table 1, a number of pairs, a seed and a schedule. A cell is
 //! trained and measured by the [`Laboratory`], kept by the [`Store`], and set beside the paper's numbers by [`paper`] and [`stats`].
 
+pub mod figure;
 mod laboratory;
 pub mod paper;
 pub mod stats;
 mod store;
+mod table;
 
-pub use laboratory::{Laboratory, Outcome, Prepared, gripper_samples};
+pub use laboratory::{Laboratory, Outcome, Prepared, Stage, gripper_samples};
 pub use store::{Kept, Store, run_all};
+pub use table::{Entry, Table, number};
 
 use crate::algorithm::Schedule;
 use crate::cost::Cost;

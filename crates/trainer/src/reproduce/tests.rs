@@ -128,3 +128,58 @@ fn all_costs_of_a_table_get_the_same_pairs_samples_and_split() {
     // Leaf tips to corners: matched points 110, 220, 330 and 0.
     assert_eq!(fixed.settings.pairs.start().targets.row(0), [1.5, -1.5]);
 }
+
+#[test]
+fn stages_end_with_one_pair_more_each_and_the_last_is_the_trained_map() {
+    let laboratory = laboratory();
+    let cell = cell(
+        Source::Shape(crate::shapes::ShapePair::Sp2),
+        Row::HaeAdaptive,
+    );
+    let stages = laboratory.stages(&cell, &|| false).unwrap();
+    let pairs: Vec<usize> = stages.iter().map(|(_, pairs)| pairs.inputs.rows).collect();
+    assert_eq!(pairs, [0, 1, 2]);
+    let trained = laboratory.run(&cell, &|| false).unwrap();
+    assert_eq!(stages[2].0, trained.model.f);
+    let panels = figure::snapshots(&laboratory, &cell, &|| false).unwrap();
+    assert_eq!(
+        (panels.len(), panels[2].points.rows, panels[2].marks.rows),
+        (3, 952, 2)
+    );
+    let heat = figure::heat(&laboratory, &cell, &trained.model.f).unwrap();
+    assert_eq!(heat.heat.len(), 476);
+    assert!(heat.heat.iter().all(|value| (0.0..=1.0).contains(value)));
+}
+
+#[test]
+fn curves_are_means_over_the_repetitions() {
+    let source = Source::Generated;
+    let done = |seed: u64, pairs: usize, vo: f64| {
+        let measures = crate::measures::Measures {
+            distortion: 1.0,
+            occupancy: Some(vo),
+            dissimilarity: 500.0,
+            nmse: None,
+        };
+        let cell = Cell {
+            pairs,
+            ..Cell::of_table(source, Row::HaeOne, seed)
+        };
+        let kept = Kept {
+            measures,
+            trace: vec![(100, measures), (200, measures)],
+            pairs: crate::data::Pairs::default(),
+            seconds: 0.0,
+        };
+        (cell, kept)
+    };
+    let cells = [done(1, 1, 0.5), done(2, 1, 0.7), done(1, 2, 0.9)];
+    let charts = figure::over_pairs(source, &cells);
+    assert_eq!(charts.len(), 3, "no NMSE for hands");
+    let points = &charts[1].curves[0].points;
+    assert_eq!(charts[1].curves.len(), 1);
+    assert!((points[0].1 - 0.6).abs() < 1e-12 && points[1] == (2.0, 0.9));
+    assert_eq!(charts[2].ceiling, Some(150.0));
+    let epochs = figure::over_epochs(source, &cells);
+    assert_eq!(epochs[0].curves[0].points, [(100.0, 1.0), (200.0, 1.0)]);
+}

@@ -1,0 +1,203 @@
+//! The paper's figures from cells: Figure 1, the snapshots of Figure 3, curves over epochs (2, 11, 14 to 19) and over the number of
+//! pairs (4, 5, 10), the heat maps of Figure 6, the principal components of Figure 13. Drawn by [`crate::figures`].
+
+use super::table::number;
+use super::{Cell, Error, Kept, Laboratory, Row, Source, paper};
+use crate::data::Matrix;
+use crate::figures::{Chart, Curve, Panel, Principal};
+use crate::measures::{NEIGHBOURS, dissimilarities};
+use crate::network::Network;
+use crate::shapes::ShapePair;
+
+/// d-Knn above this is drawn as this (Figure 6).
+pub const HEAT_CAP: f64 = 100.0;
+/// Figure 10 leaves out d-Knn above this.
+pub const CURVE_CAP: f64 = 150.0;
+
+/// Figure 1: inputs in the first row, their true images in the second, ten matched points each.
+///
+/// # Errors
+/// [`Error::Shapes`].
+pub fn shapes(laboratory: &Laboratory) -> Result<Vec<Vec<Panel>>, Error> {
+    let (mut inputs, mut targets) = (Vec::new(), Vec::new());
+    for pair in ShapePair::ALL {
+        let domains = laboratory.shape(pair)?;
+        let matched = domains.boundary.inputs.rows;
+        let ten: Vec<usize> = (0..10).map(|i| i * matched / 10).collect();
+        let panel = |title: String, points: &Matrix, marks: &Matrix| Panel {
+            title,
+            points: points.clone(),
+            grid: domains.grid.clone(),
+            marks: marks.select(&ten),
+            ..Panel::default()
+        };
+        let (truth, boundary) = (&domains.truth, &domains.boundary);
+        let title = format!("{} input", pair.name());
+        inputs.push(panel(title, &truth.inputs, &boundary.inputs));
+        let title = pair.description().to_owned();
+        targets.push(panel(title, &truth.targets, &boundary.targets));
+    }
+    Ok(vec![inputs, targets])
+}
+
+/// Figure 3: the image of the whole grid under f at the end of each stage, with the pairs so far, for one pair of shapes.
+///
+/// # Errors
+/// [`Error`].
+pub fn snapshots(
+    laboratory: &Laboratory,
+    cell: &Cell,
+    stop: &dyn Fn() -> bool,
+) -> Result<Vec<Panel>, Error> {
+    let Source::Shape(pair) = cell.source else {
+        return Err(Error::NoOutline(cell.slug()));
+    };
+    let domains = laboratory.shape(pair)?;
+    let snapshots = laboratory.stages(cell, stop)?;
+    let panels = snapshots
+        .into_iter()
+        .enumerate()
+        .map(|(stage, (f, pairs))| Panel {
+            title: format!("{}, session {}", pair.name(), stage + 1),
+            points: image(&f, &domains.truth.inputs),
+            grid: domains.grid.clone(),
+            marks: pairs.targets,
+            ..Panel::default()
+        });
+    Ok(panels.collect())
+}
+
+/// Figure 6: the image of the held-out nodes, each coloured by its own d-Knn, capped at [`HEAT_CAP`].
+///
+/// # Errors
+/// [`Error`].
+pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Panel, Error> {
+    let prepared = laboratory.prepare(cell)?;
+    let images = image(f, &prepared.test);
+    let lists = |samples: &Matrix| -> Vec<Vec<f64>> {
+        let rows = samples.iter_rows();
+        rows.map(|row| row.iter().map(|v| f64::from(*v)).collect())
+            .collect()
+    };
+    let each = dissimilarities(&lists(&prepared.test), &lists(&images), NEIGHBOURS);
+    Ok(Panel {
+        title: format!(
+            "{} {}, seed {}",
+            cell.source.name(),
+            cell.row.title(),
+            cell.seed
+        ),
+        points: images,
+        heat: each.iter().map(|d| d.min(HEAT_CAP) / HEAT_CAP).collect(),
+        ..Panel::default()
+    })
+}
+
+/// Figures 2, 11 and 14 to 16: the measures as they stood on the way, mean over the repetitions, a curve a row.
+#[must_use]
+pub fn over_epochs(source: Source, done: &[(Cell, Kept)]) -> Vec<Chart> {
+    charts(source, |row, measure| {
+        let mut epochs: Vec<(f64, f64)> = Vec::new();
+        for (_, kept) in of(done, source, row) {
+            let values = kept
+                .trace
+                .iter()
+                .map(|(epoch, m)| (*epoch as f64, number(m, measure)));
+            epochs.extend(values);
+        }
+        means(epochs)
+    })
+    .into_iter()
+    .map(|chart| Chart {
+        x_label: "epoch".to_owned(),
+        ..chart
+    })
+    .collect()
+}
+
+/// Figures 4, 5, 10 and 17 to 19: the measures over the number of pairs, mean over the repetitions, a curve a row.
+#[must_use]
+pub fn over_pairs(source: Source, done: &[(Cell, Kept)]) -> Vec<Chart> {
+    charts(source, |row, measure| {
+        let cells = of(done, source, row);
+        means(
+            cells
+                .map(|(cell, kept)| (cell.pairs as f64, number(&kept.measures, measure)))
+                .collect(),
+        )
+    })
+    .into_iter()
+    .map(|chart| Chart {
+        x_label: "reference pairs L".to_owned(),
+        ..chart
+    })
+    .collect()
+}
+
+/// Figure 13: samples, held-out samples or their images, marks and a motion along the three principal axes of `samples`.
+#[must_use]
+pub fn principal(
+    title: &str,
+    samples: &Matrix,
+    cloud: &Matrix,
+    marks: &Matrix,
+    motion: &Matrix,
+) -> Panel {
+    let axes = Principal::of(samples, 3);
+    Panel {
+        title: title.to_owned(),
+        points: axes.project(cloud),
+        cloud: axes.project(samples),
+        marks: axes.project(marks),
+        path: axes.project(motion),
+        ..Panel::default()
+    }
+}
+
+/// The image of samples in network units.
+fn image(f: &Network<f32>, samples: &Matrix) -> Matrix {
+    let mut images = Matrix::default();
+    for row in samples.iter_rows() {
+        images.push(&f.eval(row));
+    }
+    images
+}
+
+fn of(done: &[(Cell, Kept)], source: Source, row: Row) -> impl Iterator<Item = &(Cell, Kept)> {
+    let wanted = move |cell: &Cell| cell.source == source && cell.row == row;
+    done.iter().filter(move |(cell, _)| wanted(cell))
+}
+
+/// A chart a measure; rows and measures without a point are left out.
+fn charts(source: Source, points: impl Fn(Row, usize) -> Vec<(f64, f64)>) -> Vec<Chart> {
+    let rows = Row::TABLE.iter().chain(&[Row::HaeFixed]);
+    let charts = paper::MEASURES.iter().enumerate().map(|(measure, name)| {
+        let curves = rows.clone().map(|&row| Curve {
+            name: row.title().to_owned(),
+            points: points(row, measure),
+        });
+        Chart {
+            title: format!("{name}, {}", source.name()),
+            y_label: (*name).to_owned(),
+            // Folds stand out by orders of magnitude.
+            logarithmic: measure == 2 && matches!(source, Source::Shape(_)),
+            ceiling: (measure == 2 && !matches!(source, Source::Shape(_))).then_some(CURVE_CAP),
+            curves: curves.filter(|curve| !curve.points.is_empty()).collect(),
+            ..Chart::default()
+        }
+    });
+    charts.filter(|chart| !chart.curves.is_empty()).collect()
+}
+
+/// Mean of the values with equal x, x growing; values that are not finite are left out.
+fn means(mut points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    points.retain(|(_, y)| y.is_finite());
+    points.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let groups = points.chunk_by(|a, b| a.0 == b.0);
+    groups
+        .map(|group| {
+            let sum: f64 = group.iter().map(|(_, y)| y).sum();
+            (group[0].0, sum / group.len() as f64)
+        })
+        .collect()
+}

@@ -1,0 +1,142 @@
+//! Tables 2 and 4: our numbers over the repetitions beside the paper's, what lies outside the known ranges, and the t-tests of §3.2.3.
+
+use super::paper::{self, Printed};
+use super::stats::{Summary, TTest, paired_t_test, summary};
+use super::{Cell, Kept, Row, Source};
+use crate::algorithm::Schedule;
+use crate::measures::Measures;
+
+/// One number of a table.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Entry {
+    /// Over the repetitions; `None` for a measure that this source has not, or that came out not finite.
+    pub ours: Option<Summary>,
+    /// The paper's; `None` where its text is lost.
+    pub paper: Option<Printed>,
+    /// Where a right implementation's median lies, if known.
+    pub range: Option<(f64, f64)>,
+}
+
+impl Entry {
+    /// True when our median lies outside the known range.
+    #[must_use]
+    pub fn is_outside(&self) -> bool {
+        match (&self.ours, self.range) {
+            (Some(ours), Some((low, high))) => !(low..=high).contains(&ours.median),
+            _ => false,
+        }
+    }
+}
+
+/// The seven rows of one source, four measures each.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Table {
+    /// Which.
+    pub source: Source,
+    /// The rows of [`Row::TABLE`] with d̄, VO, d-Knn, NMSE.
+    pub rows: Vec<(Row, [Entry; 4])>,
+    /// d̄ of HAE (α=0) against ‖J‖² + Pin + BA and against Pin + BA, the same repetitions.
+    pub tests: [Option<TTest>; 2],
+}
+
+impl Table {
+    /// The cells that a table of these sources needs, repetition by repetition, so that a run stopped early has whole ones.
+    #[must_use]
+    pub fn cells(sources: &[Source], repetitions: u64, schedule: Schedule) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for seed in 1..=repetitions {
+            for &source in sources {
+                cells.extend(Row::TABLE.map(|row| Cell {
+                    schedule,
+                    ..Cell::of_table(source, row, seed)
+                }));
+            }
+        }
+        cells
+    }
+
+    /// The table of one source from cells that are done; cells of other sources are passed over.
+    #[must_use]
+    pub fn of(source: Source, done: &[(Cell, Kept)]) -> Self {
+        let values = |row: Row, measure: usize| -> Vec<f64> {
+            let mut cells: Vec<&(Cell, Kept)> = (done.iter())
+                .filter(|(cell, _)| cell.source == source && cell.row == row)
+                .collect();
+            cells.sort_by_key(|(cell, _)| cell.seed);
+            let numbers = cells
+                .iter()
+                .map(|(_, kept)| number(&kept.measures, measure));
+            numbers.collect()
+        };
+        let rows = Row::TABLE.map(|row| {
+            let entry = |measure| Entry {
+                ours: summary(&values(row, measure)),
+                paper: paper::printed(source, row, measure),
+                range: paper::range(source, row, measure),
+            };
+            (row, [0, 1, 2, 3].map(entry))
+        });
+        let against = |row| paired_t_test(&values(Row::HaeZero, 0), &values(row, 0));
+        Self {
+            source,
+            rows: rows.to_vec(),
+            tests: [against(Row::DistortionPinBa), against(Row::PinBa)],
+        }
+    }
+}
+
+/// d̄, VO, d-Knn, NMSE by number; NaN for what is not there.
+#[must_use]
+pub fn number(measures: &Measures, which: usize) -> f64 {
+    match which {
+        0 => measures.distortion,
+        1 => measures.occupancy.unwrap_or(f64::NAN),
+        2 => measures.dissimilarity,
+        _ => measures.nmse.unwrap_or(f64::NAN),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Pairs;
+    use crate::shapes::ShapePair;
+
+    fn kept(distortion: f64) -> Kept {
+        Kept {
+            measures: Measures {
+                distortion,
+                occupancy: Some(0.97),
+                dissimilarity: 2.5,
+                nmse: None,
+            },
+            trace: Vec::new(),
+            pairs: Pairs::default(),
+            seconds: 1.0,
+        }
+    }
+
+    #[test]
+    fn a_table_sets_ours_beside_the_papers_and_marks_what_is_outside() {
+        let source = Source::Shape(ShapePair::Sp1);
+        let cells = Table::cells(&[source, Source::Generated], 3, Schedule::Paper);
+        assert_eq!(cells.len(), 3 * 2 * 7);
+        assert_eq!((cells[0].pairs, cells[7].pairs), (4, 8));
+        let done: Vec<(Cell, Kept)> = (cells.iter())
+            .map(|&cell| {
+                let size = if cell.row == Row::PinBa { 9.0 } else { 2.0 };
+                (cell, kept(size + 0.1 * (cell.seed * cell.seed) as f64))
+            })
+            .collect();
+        let table = Table::of(source, &done);
+        let (row, adaptive) = &table.rows[6];
+        assert_eq!(*row, Row::HaeAdaptive);
+        assert_eq!(adaptive[0].ours.unwrap().count, 3);
+        assert!((adaptive[0].ours.unwrap().median - 2.4).abs() < 1e-12);
+        assert!(adaptive[0].is_outside() && !adaptive[2].is_outside());
+        assert_eq!(adaptive[0].paper.unwrap().mean, 2.085);
+        assert_eq!(adaptive[3].ours, None);
+        // Equal differences have no t; unequal ones would.
+        assert_eq!(table.tests, [None, None]);
+    }
+}
