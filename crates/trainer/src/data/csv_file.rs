@@ -22,7 +22,7 @@ pub struct Pairs {
     pub targets: Matrix,
 }
 
-/// Reads poses: the columns `joint_names`, and `time_s` if there. Needs at least one frame.
+/// Reads poses: the columns `joint_names` (radians), and `time_s` if there. Needs at least one frame.
 ///
 /// # Errors
 /// Any of [`Error`], with file, column, row and value.
@@ -45,7 +45,7 @@ pub fn poses_from(
     joint_names: &[&str],
 ) -> Result<Poses, Error> {
     let table = Table::read(reader, name)?;
-    let rows = table.columns(joint_names)?;
+    let rows = table.angles(joint_names)?;
     table.at_least(1)?;
     Ok(Poses {
         time_s: table.times()?,
@@ -53,7 +53,7 @@ pub fn poses_from(
     })
 }
 
-/// Reads pairs: the columns `inputs`, then the columns `targets`. Needs at least one row.
+/// Reads a hand's pairs: the columns `inputs` (radians), then the columns `targets`. Needs at least one row.
 ///
 /// # Errors
 /// Any of [`Error`].
@@ -64,7 +64,7 @@ pub fn read_pairs(
 ) -> Result<Pairs, Error> {
     let table = Table::open(path.as_ref())?;
     let pairs = Pairs {
-        inputs: table.columns(inputs)?,
+        inputs: table.angles(inputs)?,
         targets: table.columns(targets)?,
     };
     table.at_least(1)?;
@@ -262,6 +262,23 @@ impl Table {
             cols: places.len(),
             data: values,
         })
+    }
+
+    /// Columns of joint angles, none beyond ±2π.
+    fn angles(&self, names: &[&str]) -> Result<Matrix, Error> {
+        let angles = self.columns(names)?;
+        let beyond = |angle: &f32| angle.abs() > core::f32::consts::TAU;
+        if let Some(place) = angles.data.iter().position(beyond) {
+            let row = place / angles.cols;
+            return Err(Error::NotRadians {
+                file: self.file.clone(),
+                line: self.rows[row].0,
+                row: row + 1,
+                column: names[place % angles.cols].to_owned(),
+                value: angles.data[place],
+            });
+        }
+        Ok(angles)
     }
 
     /// The columns `<prefix>0…`: as many as the highest number in the header asks for, at least one.

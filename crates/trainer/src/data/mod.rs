@@ -285,6 +285,22 @@ pub enum Error {
         /// The field as written.
         value: String,
     },
+    /// An angle beyond ±2π: most likely the file is in degrees.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: {value} is beyond ±2π; angles are in radians: multiply degrees by 0.0174533", file.display()
+    )]
+    NotRadians {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The value.
+        value: f32,
+    },
     /// Times do not grow.
     #[error(
         "{}, line {line} (row {row}), column `time_s`: {time_s} does not come after {before}; sort the rows by time and remove doubles", file.display()

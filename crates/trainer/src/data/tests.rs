@@ -105,6 +105,16 @@ fn times_that_stand_still_or_go_back_are_refused() {
 }
 
 #[test]
+fn a_file_in_degrees_is_refused_with_its_first_impossible_angle() {
+    let said = fault("index_mcp_flex,index_pip_flex\n1,2\n6.2,-85.5\n");
+    assert!(
+        said.contains("line 3 (row 2), column `index_pip_flex`: -85.5") && said.contains("radians"),
+        "{said}"
+    );
+    assert!(poses("index_mcp_flex,index_pip_flex\n6.28,-6.28\n").is_ok());
+}
+
+#[test]
 fn bytes_that_are_no_text_are_refused_with_their_line() {
     let bytes = b"index_mcp_flex,index_pip_flex\n1,\xff\xfe\n";
     let said = poses_from(&bytes[..], Path::new("hand.csv"), &JOINTS).unwrap_err();

@@ -202,6 +202,23 @@ impl Model {
     }
 }
 
+/// The tensors of a model file.
+const TENSORS: [&str; 12] = [
+    "f.w1", "f.b1", "f.w2", "f.b2", "g.w1", "g.b1", "g.w2", "g.b2", "q.offset", "q.scale",
+    "x.offset", "x.scale",
+];
+
+/// The first tensor that a file's header lacks; `None` when the header is no list of tensors, or lacks none.
+fn first_missing(bytes: &[u8]) -> Option<&'static str> {
+    let (length, rest) = bytes.split_first_chunk::<8>()?;
+    let header = rest.get(..usize::try_from(u64::from_le_bytes(*length)).ok()?)?;
+    let header: Map<String, Value> = serde_json::from_slice(header).ok()?;
+    header
+        .values()
+        .find(|entry| entry.get("data_offsets").is_some())?;
+    TENSORS.into_iter().find(|name| !header.contains_key(*name))
+}
+
 /// A parsed file, with its name for errors.
 struct Tensors<'a> {
     file: &'a Path,
@@ -211,9 +228,16 @@ struct Tensors<'a> {
 
 impl<'a> Tensors<'a> {
     fn parse(bytes: &'a [u8], file: &'a Path) -> Result<Self, Error> {
-        let refuse = |error: safetensors::SafeTensorError| Error::NotSafetensors {
-            file: file.to_owned(),
-            what: error.to_string(),
+        let refuse = |error: safetensors::SafeTensorError| match first_missing(bytes) {
+            // A tensor cut out of the header leaves bytes that no entry covers: name the tensor, not the gap.
+            Some(tensor) => Error::MissingTensor {
+                file: file.to_owned(),
+                tensor: tensor.to_owned(),
+            },
+            None => Error::NotSafetensors {
+                file: file.to_owned(),
+                what: error.to_string(),
+            },
         };
         let (_, header) = SafeTensors::read_metadata(bytes).map_err(refuse)?;
         let metadata = header.metadata().clone().unwrap_or_default();

@@ -127,6 +127,34 @@ fn a_missing_tensor_and_a_wrong_shape_or_type_are_named() {
     assert!(said.contains("I32 numbers, expected F32"), "{said}");
 }
 
+/// Whether its bytes are left behind or taken out with it.
+#[test]
+fn a_tensor_taken_out_is_named_whatever_is_done_with_its_bytes() {
+    let model = model(3, 5, 2);
+    let bytes = model.to_bytes();
+    let read = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+    let others = read
+        .tensors()
+        .into_iter()
+        .filter(|(name, _)| name != "g.b1");
+    let without = safetensors::serialize(others, None).unwrap();
+    assert!(fault(&without).contains("tensor `g.b1` is missing"));
+    let mut length = [0; 8];
+    length.copy_from_slice(&bytes[..8]);
+    let end = 8 + u64::from_le_bytes(length) as usize;
+    let mut header: serde_json::Value = serde_json::from_slice(&bytes[8..end]).unwrap();
+    header.as_object_mut().unwrap().remove("g.b1");
+    let text = header.to_string();
+    let mut gap = (text.len() as u64).to_le_bytes().to_vec();
+    gap.extend_from_slice(text.as_bytes());
+    gap.extend_from_slice(&bytes[end..]);
+    assert!(
+        fault(&gap).contains("tensor `g.b1` is missing"),
+        "{}",
+        fault(&gap)
+    );
+}
+
 #[test]
 fn a_value_that_is_not_finite_and_a_zero_scale_are_named() {
     let mut bad = model(3, 5, 2);
