@@ -34,8 +34,8 @@ pub struct Frame {
     pub angles_valid: bool,
     /// What the map makes of them, counts; `None` where it was not asked.
     pub map_output: Option<[f32; AXES]>,
-    /// Whether a command followed in the same step; `None` while the gripper does not follow the hand.
-    pub answered: Option<bool>,
+    /// Whether the gripper follows the hand, so that a command must rest on this frame.
+    pub following: bool,
 }
 
 /// One command that left for the gripper.

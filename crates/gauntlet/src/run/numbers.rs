@@ -19,8 +19,10 @@ pub struct Numbers {
     /// From the oldest sample to the command.
     pub latency: Percentiles,
     commands: u64,
-    frames_following: u64,
+    /// A frame to be answered, and no command that rests on it yet.
+    unanswered: bool,
     frames_answered: u64,
+    frames_passed_over: u64,
     sequence_gaps: u64,
     last_sequence: Option<u32>,
     faults: u64,
@@ -49,12 +51,15 @@ impl Numbers {
                     self.sequence_gaps +=
                         u64::from(frame.sequence.wrapping_sub(last).saturating_sub(1));
                 }
-                self.following = frame.answered.is_some();
-                self.frames_following += u64::from(frame.answered.is_some());
-                self.frames_answered += u64::from(frame.answered == Some(true));
+                self.frames_passed_over += u64::from(self.unanswered && frame.following);
+                self.following = frame.following;
+                self.unanswered = frame.following;
             }
             Record::Command(command) => {
                 self.commands += 1;
+                if command.first && core::mem::take(&mut self.unanswered) {
+                    self.frames_answered += 1;
+                }
                 if let Some(us) = command.age_us.filter(|_| command.first) {
                     self.latency.add(us);
                 }
@@ -86,9 +91,9 @@ impl Numbers {
         }
     }
 
-    /// Frames that no command answered while following, and frames that never arrived here.
+    /// Frames of which no command left before the next one came, while following, and frames that never arrived here.
     pub fn dropped(&self) -> u64 {
-        self.frames_following - self.frames_answered + self.sequence_gaps
+        self.frames_passed_over + self.sequence_gaps
     }
 
     /// Faults so far.
@@ -106,7 +111,7 @@ impl Numbers {
         Summary {
             glove_frames: self.frames.count(),
             glove_frames_per_s: rounded(self.frames.mean()),
-            frames_following: self.frames_following,
+            frames_following: self.frames_answered + self.frames_passed_over,
             frames_answered: self.frames_answered,
             frames_dropped: self.dropped(),
             gripper_cycles: self.cycles.count(),
@@ -221,7 +226,7 @@ mod tests {
         Instant::from_ticks(us)
     }
 
-    fn frame(us: u64, sequence: u32, answered: Option<bool>) -> Record {
+    fn frame(us: u64, sequence: u32, following: bool) -> Record {
         let imu = Imu {
             quaternion: [1.0, 0.0, 0.0, 0.0],
             stamp: at(us),
@@ -234,8 +239,21 @@ mod tests {
             angles: [0.0; glove::hand::JOINT_COUNT],
             angles_valid: true,
             map_output: None,
-            answered,
+            following,
         }))
+    }
+
+    fn command(first: bool) -> Record {
+        Record::Command(Command {
+            at: at(0),
+            motion: Motion {
+                position: [0; AXES],
+                speed: [0; AXES],
+                force: [0; AXES],
+            },
+            age_us: Some(40_000),
+            first,
+        })
     }
 
     fn status(us: u64, position: u8) -> Record {
@@ -254,10 +272,14 @@ mod tests {
     #[test]
     fn unanswered_and_missing_frames_are_dropped_ones() {
         let mut numbers = Numbers::default();
-        numbers.count(&frame(0, u32::MAX, None));
-        numbers.count(&frame(40_000, 0, Some(true)));
-        numbers.count(&frame(80_000, 1, Some(false)));
-        numbers.count(&frame(160_000, 3, Some(true)));
+        numbers.count(&frame(0, u32::MAX, false));
+        numbers.count(&frame(40_000, 0, true));
+        numbers.count(&command(true));
+        numbers.count(&command(false));
+        numbers.count(&frame(80_000, 1, true));
+        numbers.count(&command(false));
+        numbers.count(&frame(160_000, 3, true));
+        numbers.count(&command(true));
         assert_eq!(numbers.dropped(), 2);
         let summary = numbers.summary(None);
         assert_eq!((summary.frames_following, summary.frames_answered), (3, 2));
@@ -269,7 +291,7 @@ mod tests {
         numbers.count(&status(1, 6));
         numbers.count(&status(2, 100));
         assert_eq!(numbers.first_motion(), None);
-        numbers.count(&frame(3, 0, Some(true)));
+        numbers.count(&frame(3, 0, true));
         numbers.count(&status(4, 100));
         numbers.count(&status(5, 103));
         assert_eq!(numbers.first_motion(), None);

@@ -24,7 +24,7 @@ fn frame(sequence: u32) -> Record {
         angles: core::array::from_fn::<f32, JOINT_COUNT, _>(|joint| joint as f32 / 10.0),
         angles_valid: true,
         map_output: (sequence > 0).then_some([0.1, 254.7, 127.0, 64.0]),
-        answered: None,
+        following: false,
     }))
 }
 
