@@ -240,3 +240,55 @@ fn a_16_bit_map_has_no_other_order() {
     assert!(map.repack(&mut buffer).is_err());
     assert!(map.portable().is_some());
 }
+
+/// The angles of a recorded hand: every column but the time and the clip's name.
+fn recorded_hand() -> Option<Vec<f32>> {
+    let path = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../../shared/data/hand/recorded_hand_30hz.csv"
+    );
+    let text = std::fs::read_to_string(path).ok()?;
+    let mut lines = text.lines();
+    let is_angle: Vec<bool> = lines
+        .next()?
+        .split(',')
+        .map(|name| name != "time_s" && name != "clip")
+        .collect();
+    let angles = |line: &str| -> Option<Vec<f32>> {
+        let fields = line.split(',').zip(&is_angle).filter(|(_, angle)| **angle);
+        fields.map(|(field, _)| field.trim().parse().ok()).collect()
+    };
+    lines
+        .map(angles)
+        .collect::<Option<Vec<_>>>()
+        .map(|rows| rows.concat())
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "reads a file")]
+fn over_a_recorded_hand_the_error_is_a_thousandth_of_the_output_range() {
+    let Some(poses) = recorded_hand() else {
+        println!("skipped: the recorded hand is not beside this project");
+        return;
+    };
+    assert_eq!(poses.len() % 25, 0);
+    let network = Network::random(16, [25, 300, 4]);
+    let (image, exact) = (quantise(&network, &poses), network.image());
+    let exact = Map::<25, 300, 4>::from_image(&exact).expect("a sound image");
+    let checked = parse(&image).expect("a sound image");
+    let errors = quantized::errors(&image, &checked).expect("a 16-bit image");
+    for (x, error) in errors.iter().enumerate() {
+        let outputs = poses
+            .chunks_exact(25)
+            .map(|q| exact.eval(q.try_into().expect("25")).expect("in range")[x]);
+        let (low, high) = outputs.fold((f32::MAX, f32::MIN), |(low, high), y| {
+            (low.min(y), high.max(y))
+        });
+        println!(
+            "output {x}: error {error:.4} of {:.1} counts, {:.2e}",
+            high - low,
+            error / (high - low)
+        );
+        assert!(error / (high - low) <= 1e-3);
+    }
+}

@@ -8,8 +8,8 @@ use core::arch::{asm, global_asm};
 use core::fmt::Write;
 use core::hint::black_box;
 
-use hae::{Map, quantized};
 use hae::image::{JointOrder, Meta, Parameters, encode};
+use hae::{Kernel, Map, quantized};
 
 #[path = "../workload.rs"]
 mod workload;
@@ -108,7 +108,9 @@ fn stack(mut work: impl FnMut()) -> usize {
             bottom.add(n).write_volatile(0xa5a5_5a5a);
         }
         work();
-        let untouched = (0..DEPTH / 4).take_while(|&n| bottom.add(n).read_volatile() == 0xa5a5_5a5a).count();
+        let untouched = (0..DEPTH / 4)
+            .take_while(|&n| bottom.add(n).read_volatile() == 0xa5a5_5a5a)
+            .count();
         DEPTH - 4 * untouched
     }
 }
@@ -130,8 +132,20 @@ fn shape<const Q: usize, const H: usize, const X: usize>(samples: usize) {
     let (w2, rest) = rest.split_at_mut(X * H);
     let b2 = &mut rest[..X];
     workload::parameters(&mut random, w1, b1, w2, b2);
-    let parameters = Parameters { inputs: Q, hidden: H, outputs: X, w1, b1, w2, b2 };
-    let meta = Meta { model_id: 1, version: 1, joint_order: JointOrder::natural(Q) };
+    let parameters = Parameters {
+        inputs: Q,
+        hidden: H,
+        outputs: X,
+        w1,
+        b1,
+        w2,
+        b2,
+    };
+    let meta = Meta {
+        model_id: 1,
+        version: 1,
+        joint_order: JointOrder::natural(Q),
+    };
     encode(&parameters, &meta, bytes).expect("sound parameters");
     let parse = count(|| {
         let _ = black_box(hae::image::parse(black_box(bytes)));
@@ -139,7 +153,14 @@ fn shape<const Q: usize, const H: usize, const X: usize>(samples: usize) {
     let _ = writeln!(Console, "count f32 {Q}x{H}x{X} parse {parse}");
     let map = Map::<Q, H, X>::from_image(bytes).expect("a sound image");
     measure("f32", &map, random.0, samples);
-    measure("f32", &map.portable().expect("an image in place"), random.0, samples);
+    if map.kernel() != Kernel::Portable {
+        measure(
+            "f32",
+            &map.portable().expect("an image in place"),
+            random.0,
+            samples,
+        );
+    }
 
     let seed = random.0;
     // SAFETY: as above.
@@ -154,18 +175,35 @@ fn shape<const Q: usize, const H: usize, const X: usize>(samples: usize) {
     let map = Map::<Q, H, X>::from_image(bytes).expect("a sound image");
     refuses(&map);
     measure("i16", &map, seed, samples);
-    measure("i16", &map.portable().expect("an image in place"), seed, samples);
+    if map.kernel() != Kernel::Portable {
+        measure(
+            "i16",
+            &map.portable().expect("an image in place"),
+            seed,
+            samples,
+        );
+    }
 }
 
 /// Every input that is not an angle within ±2π is refused by name, all others are taken.
 fn refuses<const Q: usize, const H: usize, const X: usize>(map: &Map<'_, Q, H, X>) {
     let limit = hae::INPUT_LIMIT;
     for input in 0..Q {
-        for value in [f32::NAN, -f32::NAN, f32::INFINITY, f32::NEG_INFINITY, limit.next_up(), -limit.next_up()] {
+        for value in [
+            f32::NAN,
+            -f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            limit.next_up(),
+            -limit.next_up(),
+        ] {
             let mut q = [0.5; Q];
             q[input] = value;
             let error = map.eval(black_box(&q)).expect_err("a refusal");
-            assert_eq!((error.input, error.value.to_bits()), (input, value.to_bits()));
+            assert_eq!(
+                (error.input, error.value.to_bits()),
+                (input, value.to_bits())
+            );
         }
         for value in [limit, -limit, 0.0, -0.0, 1e-45] {
             let mut q = [-0.5; Q];
@@ -202,13 +240,23 @@ fn measure<const Q: usize, const H: usize, const X: usize>(
     let stack = stack(|| {
         black_box(evaluate(black_box(map), black_box(&q)));
     }) - stack(|| {});
-    let _ = writeln!(Console, "count {element} {Q}x{H}x{X} {kernel:?} {most} least {least} stack {stack}");
-    let _ = writeln!(Console, "bits {element} {Q}x{H}x{X} {kernel:?} {samples} {:016x}", hash.0);
+    let _ = writeln!(
+        Console,
+        "count {element} {Q}x{H}x{X} {kernel:?} {most} least {least} stack {stack}"
+    );
+    let _ = writeln!(
+        Console,
+        "bits {element} {Q}x{H}x{X} {kernel:?} {samples} {:016x}",
+        hash.0
+    );
 }
 
 /// The call as the bridge makes it; a function of its own, so that its size and stack can be told.
 #[inline(never)]
-fn evaluate<const Q: usize, const H: usize, const X: usize>(map: &Map<'_, Q, H, X>, q: &[f32; Q]) -> [f32; X] {
+fn evaluate<const Q: usize, const H: usize, const X: usize>(
+    map: &Map<'_, Q, H, X>,
+    q: &[f32; Q],
+) -> [f32; X] {
     map.eval(q).unwrap_or([f32::NAN; X])
 }
 
