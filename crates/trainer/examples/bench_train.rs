@@ -2,17 +2,21 @@
 //!
 //! `cargo run --release -p trainer --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
 //! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or
-//! `M2,rate,ramp start,ramp,batches`. `-- speed` prints the table of times.
+//! `M2,rate,ramp start,ramp,batches,decay`. `-- speed` prints the table of times a step, `-- speed 2` on two threads.
 
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::time::Instant;
 use trainer::algorithm::{InUnits, PairPlan, Plan, Schedule, Settings, Trainer};
+use trainer::cost::fast::Steps;
+use trainer::cost::reference::Autoencoder;
+use trainer::cost::{Cost, Lambda, Weights};
 use trainer::data::{Matrix, Pairs, Split, split};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::Normalisation;
 use trainer::motion::Generator;
+use trainer::network::Network;
 use trainer::operator::{GroundTruth, Operator, Scripted, start_pairs};
 use trainer::optimizer::LearningRate;
 use trainer::shapes::ShapePair;
@@ -120,14 +124,17 @@ fn schedule(word: &str) -> Result<Schedule> {
         numbers => {
             let numbers: core::result::Result<Vec<f64>, _> =
                 numbers.split(',').map(str::parse).collect();
-            let [last, rate, start, ramp, batches] = numbers?[..] else {
-                return Err("a schedule is paper, fast or M2,rate,ramp start,ramp,batches".into());
+            let [last, rate, start, ramp, batches, decay] = numbers?[..] else {
+                return Err(
+                    "a schedule is paper, fast or M2,rate,ramp start,ramp,batches,decay".into(),
+                );
             };
             Schedule::Custom(Plan {
                 stage_epochs: 100,
                 last_epochs: last as usize,
                 rate: LearningRate {
                     initial: rate,
+                    decay,
                     ..LearningRate::PAPER
                 },
                 ramp_start: start as usize,
@@ -202,6 +209,158 @@ fn quality(name: &str, word: &str, seeds: u64, threads: usize) -> Result<()> {
     Ok(())
 }
 
+/// Sizes of a task: samples of Q and X, dimensions of Q and X, hidden units.
+#[derive(Clone, Copy)]
+struct Size {
+    q: usize,
+    x: usize,
+    dq: usize,
+    dx: usize,
+    hidden: usize,
+}
+
+/// Clouds of uniform numbers whose inputs lie near a `dx`-dimensional sheet, and networks with small random weights.
+fn task(size: &Size) -> (Autoencoder, Matrix, Matrix, Pairs) {
+    let mut random = ChaCha8Rng::seed_from_u64(1);
+    let mut cloud = |rows: usize, cols: usize, sheet: usize, scale: f32| {
+        let mut data = Vec::with_capacity(rows * cols);
+        for _ in 0..rows {
+            let place: Vec<f32> = (0..sheet)
+                .map(|_| random.random_range(-scale..scale))
+                .collect();
+            for i in 0..cols {
+                let turn = place[i % sheet] + 0.3 * place[(i + 1) % sheet] * place[i % sheet];
+                data.push(turn + 0.05 * random.random_range(-scale..scale));
+            }
+        }
+        Matrix::from_vec(rows, cols, data).unwrap_or_default()
+    };
+    let q = cloud(size.q, size.dq, size.dx.min(size.dq), 1.0);
+    let x = cloud(size.x, size.dx, size.dx, 0.7);
+    let pairs = Pairs {
+        inputs: q.select(&[0, 1, 2, 3]),
+        targets: x.select(&[0, 1, 2, 3]),
+    };
+    let mut network = |inputs: usize, outputs: usize| {
+        let mut net = Network::zeros(inputs, size.hidden, outputs);
+        let limit = |a: usize, b: usize| (6.0 / (a + b) as f32).sqrt();
+        let (one, two) = (limit(inputs, size.hidden), limit(size.hidden, outputs));
+        net.w1
+            .iter_mut()
+            .for_each(|w| *w = random.random_range(-one..one));
+        net.w2
+            .iter_mut()
+            .for_each(|w| *w = random.random_range(-two..two));
+        net
+    };
+    let networks = Autoencoder {
+        f: network(size.dq, size.dx),
+        g: network(size.dx, size.dq),
+    };
+    (networks, q, x, pairs)
+}
+
+/// Least and median milliseconds a step of 60, after 60 others.
+fn time(size: &Size, weights: &Weights, threads: usize) -> (f64, f64) {
+    let (networks, q, x, pairs) = task(size);
+    let mut steps = Steps::new(&networks, (&q, &x), &pairs, threads);
+    for _ in 0..60 {
+        steps.step(weights);
+    }
+    let mut times: Vec<f64> = (0..60)
+        .map(|_| {
+            let start = Instant::now();
+            steps.step(weights);
+            start.elapsed().as_secs_f64() * 1e3
+        })
+        .collect();
+    times.sort_by(f64::total_cmp);
+    (times[0], times[30])
+}
+
+fn speed(threads: usize) {
+    let sp1 = Size {
+        q: 704,
+        x: 8000,
+        dq: 3,
+        dx: 2,
+        hidden: 300,
+    };
+    let hand = Size {
+        q: 381,
+        dq: 25,
+        dx: 4,
+        ..sp1
+    };
+    let full = Cost::Hae.weights(&Lambda::SHAPES);
+    println!("| task, {threads} threads | least ms a step | median |\n|---|---|---|");
+    let row = |name: &str, size: &Size, weights: &Weights| {
+        let (least, median) = time(size, weights, threads);
+        println!("| {name} | {least:.3} | {median:.3} |");
+    };
+    for (name, size) in [("SP1", &sp1), ("hand", &hand)] {
+        row(&format!("{name}, everything"), size, &full);
+        let without = [
+            (
+                "attraction",
+                Weights {
+                    attraction: 0.0,
+                    ..full
+                },
+            ),
+            ("what α adds", Weights { alpha: 0.0, ..full }),
+            (
+                "distortion",
+                Weights {
+                    distortion: 0.0,
+                    ..full
+                },
+            ),
+            (
+                "reconstruction",
+                Weights {
+                    reconstruction: 0.0,
+                    ..full
+                },
+            ),
+        ];
+        for (term, weights) in without {
+            row(&format!("{name} without {term}"), size, &weights);
+        }
+        for factor in [2, 4] {
+            row(
+                &format!("{name}, N_Q × {factor}"),
+                &Size {
+                    q: size.q * factor,
+                    ..*size
+                },
+                &full,
+            );
+            row(
+                &format!("{name}, N_X × {factor}"),
+                &Size {
+                    x: size.x * factor,
+                    ..*size
+                },
+                &full,
+            );
+            let wide = Size {
+                hidden: size.hidden * factor,
+                ..*size
+            };
+            row(&format!("{name}, H × {factor}"), &wide, &full);
+            row(
+                &format!("{name}, D_Q × {factor}"),
+                &Size {
+                    dq: size.dq * factor,
+                    ..*size
+                },
+                &full,
+            );
+        }
+    }
+}
+
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let word = |n: usize, default: &'static str| words.get(n).map_or(default, String::as_str);
@@ -212,6 +371,9 @@ fn main() -> Result<()> {
             word(3, "5").parse()?,
             word(4, "2").parse()?,
         ),
-        _ => Ok(()),
+        _ => {
+            speed(word(1, "1").parse()?);
+            Ok(())
+        }
     }
 }

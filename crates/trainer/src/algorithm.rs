@@ -17,8 +17,9 @@ use crate::cost::reference::Autoencoder;
 use crate::cost::{Parts, Weights};
 use crate::data::{Matrix, Pairs};
 use crate::kernel::Blocks;
+use crate::measures::{NEIGHBOURS, fold_factor, gap_factor};
 use crate::model::Normalisation;
-use crate::neighbours::farthest;
+use crate::neighbours::{farthest, rows};
 use crate::network::Network;
 use crate::operator::{self, Operator};
 use crate::random::Random;
@@ -29,6 +30,12 @@ use std::time::Instant;
 /// Streams of random numbers of one seed.
 const WEIGHT_STREAM: u64 = 0x5745_4947;
 const BATCH_STREAM: u64 = 0x4241_5443;
+
+/// From these factors on the map is said to fold, to leave targets uncovered (right maps: below 3, below 1.6).
+const FOLD: f64 = 5.0;
+const GAP: f64 = 3.0;
+/// A look at the map takes time with the square of the samples.
+const MOST_LOOKED_AT: usize = 2000;
 
 /// Where the training stands; given to the callback of [`Trainer::run`].
 #[derive(Clone, Debug)]
@@ -118,7 +125,7 @@ impl Trainer {
     /// Whatever is wrong with samples, pairs or settings, in a line that names it.
     pub fn new(q: &Matrix, x: &Matrix, settings: &Settings) -> Result<Self, Error> {
         let warnings = check::samples(q, x, settings)?;
-        let plan = settings.schedule.plan();
+        let plan = settings.schedule.plan_for(x.cols);
         let mut random = Random::new(settings.seed, WEIGHT_STREAM);
         let start = settings.initialisation;
         let networks = Autoencoder {
@@ -190,6 +197,12 @@ impl Trainer {
                 }
                 self.report(&clock, progress, None)?;
             }
+            if self.is_look_due() {
+                for warning in self.look_at_map() {
+                    self.report(&clock, progress, Some(warning))?;
+                }
+                clock.rest();
+            }
         }
         Ok(Trained {
             networks: self.networks(),
@@ -197,6 +210,31 @@ impl Trainer {
             epochs: self.epoch,
             parts: self.parts,
         })
+    }
+
+    /// The map is looked at when λ3 has just reached its full value, and at the end.
+    fn is_look_due(&self) -> bool {
+        let last = self.plan.stage_epochs * self.early_stages();
+        let risen = last + self.plan.ramp_start + self.plan.ramp_epochs;
+        self.epoch == risen || self.epoch == self.total()
+    }
+
+    /// Folds and uncovered targets, as far as the training samples show them.
+    fn look_at_map(&mut self) -> Vec<Warning> {
+        let f: Network<f64> = self.networks().f.cast();
+        let most: Vec<usize> = (0..self.q.rows.min(MOST_LOOKED_AT)).collect();
+        let inputs = rows(&self.q.select(&most));
+        let images: Vec<Vec<f64>> = inputs.iter().map(|q| f.eval(q)).collect();
+        let mut warnings = Vec::new();
+        let factor = fold_factor(&inputs, &images, NEIGHBOURS);
+        if factor > FOLD && inputs.len() > 10 * NEIGHBOURS {
+            warnings.push(Warning::Fold { factor });
+        }
+        let factor = gap_factor(&images, &self.x);
+        if factor > GAP && self.weights(self.total()).attraction != 0.0 {
+            warnings.push(Warning::Uncovered { factor });
+        }
+        warnings
     }
 
     fn report(
@@ -263,7 +301,7 @@ impl Trainer {
         if self.pairs.inputs.rows >= start.inputs.rows + due {
             return Ok(());
         }
-        let codes = rows(&self.engine.codes());
+        let codes = samples(&self.engine.codes());
         let Some(index) = farthest(&self.x, &codes) else {
             return Ok(());
         };
@@ -279,7 +317,7 @@ impl Trainer {
 }
 
 /// The samples of point lanes, row after row.
-fn rows(blocks: &Blocks) -> Vec<Vec<f64>> {
+fn samples(blocks: &Blocks) -> Vec<Vec<f64>> {
     let row = |n| {
         (0..blocks.dims)
             .map(|i| f64::from(blocks.get(n, i)))
@@ -334,6 +372,11 @@ impl Clock {
             .min(10.0 * self.seconds[with]);
         self.seconds[with] += 0.05 * (elapsed - self.seconds[with]);
         self.last = now;
+    }
+
+    /// Leaves the time since the last step out.
+    fn rest(&mut self) {
+        self.last = Instant::now();
     }
 
     fn remaining(&self, trainer: &Trainer) -> Duration {

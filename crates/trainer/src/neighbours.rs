@@ -3,27 +3,30 @@
 use crate::data::Matrix;
 
 /// ‖a − b‖², in f64, dimensions in ascending order.
-pub(crate) fn square_distance<A: Copy + Into<f64>, B: Copy + Into<f64>>(a: &[A], b: &[B]) -> f64 {
+pub(crate) fn square_distance(a: &[f64], b: &[f64]) -> f64 {
     let pairs = a.iter().zip(b);
-    pairs.fold(0.0, |sum, (&a, &b)| {
-        let d = a.into() - b.into();
-        sum + d * d
-    })
+    pairs.fold(0.0, |sum, (a, b)| sum + (a - b) * (a - b))
 }
 
 /// Squared distance from each query to the nearest of `cloud` (Eq. 11); infinite if the cloud is empty.
-pub(crate) fn nearest_distances(queries: &Matrix, cloud: &[Vec<f64>]) -> Vec<f64> {
-    let nearest = |query: &[f32]| {
+pub(crate) fn nearest_distances(queries: &[Vec<f64>], cloud: &[Vec<f64>]) -> Vec<f64> {
+    let nearest = |query: &Vec<f64>| {
         let distances = cloud.iter().map(|point| square_distance(query, point));
         distances.fold(f64::INFINITY, f64::min)
     };
-    queries.iter_rows().map(nearest).collect()
+    queries.iter().map(nearest).collect()
+}
+
+/// The rows of a matrix in f64.
+pub(crate) fn rows(matrix: &Matrix) -> Vec<Vec<f64>> {
+    let widen = |row: &[f32]| row.iter().map(|&v| f64::from(v)).collect();
+    matrix.iter_rows().map(widen).collect()
 }
 
 /// Index of the query that is farthest from its nearest of `cloud` (Eq. 12), the first of equals; `None` without queries.
 #[must_use]
 pub fn farthest(queries: &Matrix, cloud: &[Vec<f64>]) -> Option<usize> {
-    let distances = nearest_distances(queries, cloud);
+    let distances = nearest_distances(&rows(queries), cloud);
     let better = |best: Option<usize>, (i, d): (usize, &f64)| match best {
         Some(b) if distances[b] >= *d => Some(b),
         _ => Some(i),

@@ -8,8 +8,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use trainer::cost::Weights;
 use trainer::cost::reference::{Autoencoder, Data, evaluate};
-use trainer::data::{Matrix, Pairs};
-use trainer::measures::{Coverage, Test, measure};
+use trainer::measures::measure_rows;
 use trainer::network::Network;
 use trainer::optimizer::{LearningRate, Nadam};
 
@@ -70,28 +69,17 @@ fn five_golden_steps_of_nadam_agree_in_f64() {
     }
 }
 
-/// The measures are taken from f32 samples and f64 weights, so the samples' rounding limits the agreement.
 #[test]
 fn golden_measures_agree() {
     for case in cases() {
-        let (inputs, targets) = (matrix(&case.q), matrix(&case.x));
         let truth = truth(&case);
-        let truth = Pairs {
-            inputs: inputs.clone(),
-            targets: matrix(&truth),
-        };
-        let test = Test {
-            inputs: &inputs,
-            targets: &targets,
-            coverage: Coverage::Epsilon(0.05),
-            truth: Some(&truth),
-        };
-        let got = measure(&case.networks.f, &test);
+        let (f, q) = (&case.networks.f, &case.q[..]);
+        let got = measure_rows(f, q, &case.x, Some(0.05), Some([q, &truth]));
         let want = |name: &str| case.json["measures"][name].as_f64().unwrap();
-        assert!((got.distortion / want("dbar") - 1.0).abs() < 1e-6);
+        assert!((got.distortion / want("dbar") - 1.0).abs() < 1e-9);
         assert!((got.occupancy.unwrap() - want("VO")).abs() < 1e-9);
-        assert!((got.dissimilarity / want("dknn") - 1.0).abs() < 1e-5);
-        assert!((got.nmse.unwrap() / want("NMSE") - 1.0).abs() < 1e-6);
+        assert!((got.dissimilarity / want("dknn") - 1.0).abs() < 1e-9);
+        assert!((got.nmse.unwrap() / want("NMSE") - 1.0).abs() < 1e-9);
     }
 }
 
@@ -100,11 +88,6 @@ fn truth(case: &common::Case) -> Vec<Vec<f64>> {
     let outputs = case.networks.f.outputs;
     let row = |q: &Vec<f64>| (0..outputs).map(|i| q[i % q.len()]).collect();
     case.q.iter().map(row).collect()
-}
-
-fn matrix(rows: &[Vec<f64>]) -> Matrix {
-    let values = rows.iter().flatten().map(|&v| v as f32).collect();
-    Matrix::from_vec(rows.len(), rows[0].len(), values).unwrap()
 }
 
 /// Each term alone and all together, on random shapes: the gradient is the slope of the cost along random directions.

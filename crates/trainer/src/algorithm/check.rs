@@ -127,6 +127,22 @@ pub enum Warning {
         /// How many.
         count: usize,
     },
+    /// Two parts of the inputs are mapped onto one another.
+    #[error(
+        "the map seems to fold: neighbours in the image are {factor:.0} times farther apart in the input than they should be; another seed, adaptive pairs or one more pair usually unfolds it"
+    )]
+    Fold {
+        /// [`crate::measures::fold_factor`] on the training samples.
+        factor: f64,
+    },
+    /// Much of the target has no image near.
+    #[error(
+        "the map leaves part of the target uncovered: targets are {factor:.1} times as far from it as from evenly spread points; bring input samples of more varied poses, or train longer"
+    )]
+    Uncovered {
+        /// [`crate::measures::gap_factor`] on the training samples.
+        factor: f64,
+    },
     /// A pair outside the samples' range.
     #[error(
         "reference pair {pair}, {what} column {column}: {value} is outside the samples' range {low} to {high}"

@@ -265,3 +265,37 @@ fn a_training_that_diverges_says_so() {
     let error = trainer.run(&mut above(), &mut go_on).unwrap_err();
     assert!(matches!(error, Error::Diverged { .. }), "{error}");
 }
+
+#[test]
+fn a_map_that_leaves_half_of_the_target_uncovered_says_so_in_time() {
+    let (q, x) = samples();
+    let corner = Matrix::from_rows(&[[0.9, 0.7, 0.243], [0.8, 0.7, 0.2], [0.9, 0.6, 0.243]]);
+    let settings = Settings {
+        // So much distortion weight that the map stays small whatever the attraction says.
+        lambda: crate::cost::Lambda {
+            distortion: 50.0,
+            ..crate::cost::Lambda::SHAPES
+        },
+        pairs: PairPlan::Fixed(Pairs {
+            targets: Matrix::from_rows(&[[0.9, 0.7], [0.8, 0.7], [0.9, 0.6]]),
+            inputs: corner,
+        }),
+        ..short(1)
+    };
+    let mut told = Vec::new();
+    let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
+    let trained = trainer.run(&mut Nobody, &mut |p| {
+        if let Some(warning) = &p.warning {
+            told.push((p.epoch, warning.clone()));
+        }
+        ControlFlow::Continue(())
+    });
+    trained.unwrap();
+    let uncovered = |(_, w): &&(usize, Warning)| matches!(w, Warning::Uncovered { .. });
+    let epochs: Vec<usize> = told
+        .iter()
+        .filter(uncovered)
+        .map(|(epoch, _)| *epoch)
+        .collect();
+    assert_eq!(epochs, [80, 150], "{told:?}");
+}

@@ -1,9 +1,11 @@
-//! The fast f32 cost and gradient, for those who want a single evaluation (tests, measurements). Training uses the same code.
+//! The fast f32 cost and gradient, for those who want a single evaluation or bare steps (tests, measurements). Training uses the same
+//! code.
 
 use super::engine::Engine;
 use super::reference::Autoencoder;
 use super::{Parts, Weights};
 use crate::data::{Matrix, Pairs};
+use crate::optimizer::LearningRate;
 
 /// As [`super::reference::evaluate`], in f32 on the kernels of this machine with `threads` threads.
 ///
@@ -19,4 +21,27 @@ pub fn evaluate(
     let mut engine = Engine::new(networks, q, core::slice::from_ref(x), threads);
     engine.set_pairs(&pairs.inputs, &pairs.targets);
     engine.evaluate(weights, 0)
+}
+
+/// Bare training steps, full batch, at the paper's learning rate.
+pub struct Steps(Engine);
+
+impl Steps {
+    /// From these networks, on these samples and pairs; shapes as for [`evaluate`].
+    #[must_use]
+    pub fn new(
+        networks: &Autoencoder,
+        (q, x): (&Matrix, &Matrix),
+        pairs: &Pairs,
+        threads: usize,
+    ) -> Self {
+        let mut engine = Engine::new(networks, q, core::slice::from_ref(x), threads);
+        engine.set_pairs(&pairs.inputs, &pairs.targets);
+        Self(engine)
+    }
+
+    /// One step of Nadam; the parts of the cost before it.
+    pub fn step(&mut self, weights: &Weights) -> Parts {
+        self.0.step(weights, 0, &LearningRate::PAPER)
+    }
 }

@@ -94,6 +94,8 @@ unsafe fn tiles<V: Lanes>(
             0
         }
     ];
+    // Activations and their gradients of 16 units for 16 samples, written before they are read.
+    let (mut h, mut d) = ([0.0_f32; LANES * LANES], [0.0_f32; LANES * LANES]);
     // SAFETY: the lengths were checked, features by the caller.
     unsafe {
         for tile in (0..shape.padded()).step_by(LANES) {
@@ -102,7 +104,6 @@ unsafe fn tiles<V: Lanes>(
             for block in 0..blocks {
                 let x = flow.input.as_ptr().add(block * inputs * LANES);
                 let e = flow.by_output.as_ptr().add(block * outputs * LANES);
-                let (mut h, mut d) = ([0.0_f32; LANES * LANES], [0.0_f32; LANES * LANES]);
                 for p in (0..LANES).step_by(4) {
                     units::<V>(shape, weights, x.add(p), e.add(p), &mut h, &mut d, p);
                 }
@@ -280,7 +281,11 @@ unsafe fn active_sums<V: Lanes>(
             *active = V::bits(V::load(h.as_ptr().add(p * LANES)).gt(zero));
         }
         let mut c = 0;
-        while c + 4 <= cells {
+        while c + 8 <= cells {
+            active_rows::<V, 8>(jacobian, &active, sums, c);
+            c += 8;
+        }
+        if c + 4 <= cells {
             active_rows::<V, 4>(jacobian, &active, sums, c);
             c += 4;
         }
