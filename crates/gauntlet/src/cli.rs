@@ -20,6 +20,7 @@ Start here:
 
 With hardware:
   gauntlet ports                                 which serial ports are there
+  gauntlet doctor --gripper /dev/ttyUSB1 --glove /dev/ttyUSB0
   gauntlet train --poses my_hand.csv --out model.safetensors
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
 
@@ -47,6 +48,10 @@ pub enum Verb {
     Teleop(Teleop),
     /// List the serial ports of this machine.
     Ports(Ports),
+    /// Read, activate and move a gripper at a bench.
+    Gripper(crate::commands::gripper::Gripper),
+    /// Find out which layer fails: port, line, unit, device.
+    Doctor(crate::commands::doctor::Doctor),
 }
 
 /// Options of `demo`.
@@ -216,7 +221,7 @@ pub struct Teleop {
     /// The glove's serial port.
     #[arg(long, value_name = "PORT")]
     pub glove: PathBuf,
-    /// The gripper's serial port.
+    /// The gripper's serial port, or tcp:HOST[:PORT].
     #[arg(long, value_name = "PORT")]
     pub gripper: PathBuf,
     /// The trained model.
@@ -260,7 +265,7 @@ pub struct Ports {
 }
 
 /// Whole or broken seconds from 1 to a day.
-fn run_time(text: &str) -> Result<Duration, String> {
+pub(crate) fn run_time(text: &str) -> Result<Duration, String> {
     let seconds: f64 = text
         .parse()
         .map_err(|_| format!("{text} is not a number of seconds"))?;

@@ -6,6 +6,7 @@
 //! | [`failure`], [`out`], [`tell`], [`progress`] | what a person reads |
 //! | [`port`], [`ports`], [`probe`] | serial ports: open, list, is anybody there |
 //! | [`line`], [`tcp`] | a gripper's line: a serial port or Modbus TCP |
+//! | [`diagnose`] | which layer of a device fails |
 //! | [`platform`], [`slots`], [`session`] | the bridge on a PC: clock and wait, weights, thread and queues |
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
@@ -13,6 +14,7 @@
 
 pub mod cli;
 pub mod commands;
+pub mod diagnose;
 pub mod failure;
 pub mod interrupt;
 pub mod line;

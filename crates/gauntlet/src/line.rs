@@ -48,15 +48,18 @@ impl Line {
     /// How to set up a driver on this line.
     pub fn driver_config(&self, settings: Settings) -> gripper::driver::Config {
         match self {
-            Self::Serial(_) => {
-                let usual = gripper::driver::Config::for_pc();
-                gripper::driver::Config {
-                    unit: settings.unit.unwrap_or(usual.unit),
-                    baud: settings.baud.unwrap_or(BAUD),
-                    ..usual
-                }
-            }
+            Self::Serial(_) => Self::serial_config(settings),
             Self::Tcp(port) => port.driver_config(),
+        }
+    }
+
+    /// How to set up a driver on a serial line.
+    pub fn serial_config(settings: Settings) -> gripper::driver::Config {
+        let usual = gripper::driver::Config::for_pc();
+        gripper::driver::Config {
+            unit: settings.unit.unwrap_or(usual.unit),
+            baud: settings.baud.unwrap_or(BAUD),
+            ..usual
         }
     }
 

@@ -1,7 +1,9 @@
 //! The verbs, one module each.
 
 mod demo;
+pub mod doctor;
 mod eval;
+pub mod gripper;
 mod ports;
 mod simulate;
 mod teleop;
@@ -29,5 +31,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Simulate(options) => simulate::run(&options, &interrupt),
         Verb::Teleop(options) => teleop::run(&options, &interrupt),
         Verb::Ports(options) => ports::run(&options),
+        Verb::Gripper(options) => gripper::run(&options, &interrupt),
+        Verb::Doctor(options) => doctor::run(&options, &interrupt),
     }
 }

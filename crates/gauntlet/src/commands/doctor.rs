@@ -1,0 +1,121 @@
+//! `gauntlet doctor`: which layer fails, and what to do about it.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use serde_json::json;
+
+use crate::diagnose::{self, Findings, Verdict};
+use crate::failure::{Failure, OrFail};
+use crate::interrupt::Interrupt;
+use crate::{out, ports, say};
+
+/// Options of `doctor`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet doctor                                           the ports alone
+  gauntlet doctor --gripper /dev/ttyUSB1 --glove /dev/ttyUSB0
+  gauntlet doctor --gripper tcp:192.168.1.11 --json
+
+Nothing moves: a gripper is only read. A glove's sensors are brought up. A gripper that does not answer
+is looked for at other speeds and under every unit number, which takes up to 15 seconds.
+Exit code 1 when something is wrong.")]
+pub struct Doctor {
+    /// The gripper's serial port, or tcp:HOST[:PORT].
+    #[arg(long, value_name = "PORT")]
+    pub gripper: Option<PathBuf>,
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT")]
+    pub glove: Option<PathBuf>,
+    /// Print the findings as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Examines what is named; the ports, where nothing is.
+///
+/// # Errors
+/// A failure (exit code 1) when something is wrong.
+pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
+    let mut all = Vec::new();
+    let mut examine = |device: &'static str, place: String, findings: Findings| {
+        if !options.json {
+            show(device, &place, &findings);
+        }
+        all.push((device, place, findings));
+    };
+    if let Some(path) = &options.gripper {
+        let findings = diagnose::gripper(path, interrupt);
+        examine("gripper", path.display().to_string(), findings);
+    }
+    if let Some(path) = &options.glove {
+        let findings = diagnose::glove(path, interrupt);
+        examine("glove", path.display().to_string(), findings);
+    }
+    if all.is_empty() {
+        return only_ports(options.json);
+    }
+    let faults: usize = all.iter().map(|(_, _, findings)| findings.faults()).sum();
+    if options.json {
+        let devices: Vec<_> = all
+            .iter()
+            .map(|(device, place, findings)| {
+                json!({ "device": device, "place": place, "findings": findings })
+            })
+            .collect();
+        out::json(&json!({ "devices": devices, "wrong": faults }))?;
+    }
+    match faults {
+        0 => Ok(()),
+        1 => Err(Failure::new("1 thing is wrong", "what stands below it").into()),
+        _ => {
+            let what = format!("{faults} things are wrong");
+            Err(Failure::new(what, "the first one first").into())
+        }
+    }
+}
+
+fn show(device: &str, place: &str, findings: &Findings) {
+    say!("{device}  {place}");
+    for finding in &findings.0 {
+        let verdict = match finding.verdict {
+            Verdict::Good => "ok",
+            Verdict::Note => "note",
+            Verdict::Wrong => "WRONG",
+        };
+        say!("  {verdict:<5}  {:<11}  {}", finding.layer, finding.what);
+        if let Some(next) = &finding.next {
+            say!("         {:<11}  try: {next}", "");
+        }
+    }
+}
+
+fn only_ports(as_json: bool) -> Result<()> {
+    let ports = ports::list().or_fail(
+        || "the serial ports cannot be listed".to_owned(),
+        "`ls /dev/tty*`",
+    )?;
+    if as_json {
+        out::json(&json!({ "devices": [], "ports": ports }))?;
+    } else {
+        for port in &ports {
+            say!("port  {}", port.path.display());
+            for warning in &port.warnings {
+                say!("  note   {warning}");
+            }
+        }
+    }
+    if ports.is_empty() {
+        return Err(Failure::new(
+            "no serial port found",
+            "plugging the adapter in, and `dmesg` for what the system says about it",
+        )
+        .into());
+    }
+    if !as_json {
+        say!("name a device for more: gauntlet doctor --gripper PORT --glove PORT");
+    }
+    Ok(())
+}

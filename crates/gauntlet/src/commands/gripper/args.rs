@@ -1,0 +1,177 @@
+//! The options of `gauntlet gripper`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, Subcommand, ValueEnum};
+use gripper::registers::three_finger;
+
+use crate::line::Settings;
+
+/// Options of `gripper`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet gripper status   --gripper /dev/ttyUSB1
+  gauntlet gripper activate --gripper /dev/ttyUSB1               the fingers move
+  gauntlet gripper move     --gripper /dev/ttyUSB1 --to 120      all fingers, 0 open to 255 closed
+  gauntlet gripper move     --gripper tcp:192.168.1.11 --to 100,100,100,137 --speed 50
+  gauntlet gripper mode pinch --gripper /dev/ttyUSB1
+  gauntlet gripper watch    --gripper /dev/ttyUSB1 --model 2f85 --seconds 10
+
+status and watch only read. Ctrl-C during a move holds the gripper where it is.")]
+pub struct Gripper {
+    /// What to do.
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+/// What can be done with a gripper at a bench.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Read the gripper's state and say what it means.
+    Status(Target),
+    /// Activate the gripper: THE FINGERS MOVE, through their whole range.
+    Activate(Target),
+    /// Move to a position and wait until the gripper is there or holds something.
+    Move(Move),
+    /// Change the grasping mode (3-Finger only): the fingers move.
+    Mode(Mode),
+    /// Automatic release: all axes open slowly; the gripper needs an activation after it.
+    Release(Release),
+    /// Clear faults and the activation: THE GRIPPER LETS GO, and needs an activation after it.
+    Reset(Target),
+    /// Show every change until the time is over or Ctrl-C.
+    Watch(Watch),
+}
+
+/// Which gripper.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Model {
+    /// 3-Finger Adaptive Gripper.
+    #[value(name = "3f")]
+    ThreeFinger,
+    /// 2F-85.
+    #[value(name = "2f85")]
+    TwoFinger85,
+    /// 2F-140.
+    #[value(name = "2f140")]
+    TwoFinger140,
+    /// Hand-E.
+    #[value(name = "hande")]
+    HandE,
+}
+
+/// Where the gripper is and how to talk about it.
+#[derive(Debug, Clone, Args)]
+pub struct Target {
+    /// The gripper's serial port, or tcp:HOST[:PORT] (3-Finger).
+    #[arg(long, value_name = "PORT")]
+    pub gripper: PathBuf,
+    /// Which gripper it is.
+    #[arg(long, value_enum, default_value_t = Model::ThreeFinger)]
+    pub model: Model,
+    /// Its Modbus unit (slave id), if not 9 on a serial line or 2 over TCP.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=247))]
+    pub unit: Option<u8>,
+    /// Speed of the serial line, if not 115200.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
+    pub baud: Option<u32>,
+    /// Show the status block's bytes too.
+    #[arg(long)]
+    pub raw: bool,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Target {
+    /// What differs from a gripper as delivered.
+    pub fn settings(&self) -> Settings {
+        Settings {
+            unit: self.unit,
+            baud: self.baud,
+        }
+    }
+}
+
+/// Options of `gripper move`.
+#[derive(Debug, Args)]
+pub struct Move {
+    /// Where it is.
+    #[command(flatten)]
+    pub target: Target,
+    /// Position, 0 open to 255 closed: one number (3-Finger: for all fingers, the scissor where the mode puts it), or
+    /// A,B,C,SCISSOR for each axis of a 3-Finger on its own.
+    #[arg(
+        long,
+        value_name = "P",
+        value_delimiter = ',',
+        required = true,
+        num_args = 1
+    )]
+    pub to: Vec<u8>,
+    /// Speed, 0 slowest to 255 fastest.
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    pub speed: u8,
+    /// Force, 0 least to 255 most.
+    #[arg(long, value_name = "N", default_value_t = 64)]
+    pub force: u8,
+}
+
+/// Options of `gripper mode`.
+#[derive(Debug, Args)]
+pub struct Mode {
+    /// Which mode.
+    #[arg(value_enum)]
+    pub mode: Grasp,
+    /// Where the gripper is.
+    #[command(flatten)]
+    pub target: Target,
+}
+
+/// A grasping mode.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Grasp {
+    /// Parallel fingers.
+    Basic,
+    /// B and C together.
+    Pinch,
+    /// B and C apart.
+    Wide,
+    /// B against C, finger A unused.
+    Scissor,
+}
+
+impl From<Grasp> for three_finger::Mode {
+    fn from(mode: Grasp) -> Self {
+        match mode {
+            Grasp::Basic => Self::Basic,
+            Grasp::Pinch => Self::Pinch,
+            Grasp::Wide => Self::Wide,
+            Grasp::Scissor => Self::Scissor,
+        }
+    }
+}
+
+/// Options of `gripper release`.
+#[derive(Debug, Args)]
+pub struct Release {
+    /// Where the gripper is.
+    #[command(flatten)]
+    pub target: Target,
+    /// Close instead of open (2-Finger ones, for an object held from inside).
+    #[arg(long)]
+    pub closing: bool,
+}
+
+/// Options of `gripper watch`.
+#[derive(Debug, Args)]
+pub struct Watch {
+    /// Where the gripper is.
+    #[command(flatten)]
+    pub target: Target,
+    /// End by itself after this many seconds (1 to 86400).
+    #[arg(long, value_name = "N", default_value = "60", value_parser = crate::cli::run_time)]
+    pub seconds: Duration,
+}

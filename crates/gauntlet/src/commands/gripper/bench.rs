@@ -1,0 +1,275 @@
+//! Both families of drivers as a person at a bench uses them: asked, watched, within deadlines.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use gripper::driver::{Control, Outcome, Task, ThreeFinger, TwoFinger};
+use gripper::registers::{three_finger, two_finger};
+use gripper::{Gripper, Status};
+
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::line::Line;
+use crate::platform::Clock;
+use crate::tcp;
+
+/// Time a gripper gets to answer a first status read.
+pub const ANSWER_WAIT: Duration = Duration::from_secs(3);
+/// Pause between two looks at the line.
+const LOOK: Duration = Duration::from_millis(1);
+/// Longer than every task's own deadline, for a driver that is never polled to its end.
+const TASK_WAIT: Duration = Duration::from_secs(65);
+
+/// What the verbs need of a driver beyond [`Gripper`].
+pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
+    /// Registers' bytes of the newest status.
+    fn raw(&self) -> Option<Vec<u8>>;
+    /// Whether the gripper repeats the newest motion.
+    fn accepted(&self) -> bool;
+    /// The task under way, or how the last one ended.
+    fn outcome(&self) -> (Option<Task>, Option<(Task, Outcome)>);
+    /// Clears rACT.
+    fn reset(&mut self);
+    /// Automatic release; `false` where the family cannot close in it.
+    fn release(&mut self, closing: bool) -> bool;
+    /// Another grasping mode; `false` where the family has none.
+    fn set_mode(&mut self, mode: three_finger::Mode) -> bool;
+    /// Each axis by its own position, or all as the mode has it.
+    fn set_individual(&mut self, individual: bool);
+    /// The gripper's name and those of its axes.
+    fn names(&self) -> (&'static str, [&'static str; X]);
+    /// What only this family tells: name and value.
+    fn facts(&self) -> Vec<(&'static str, String)>;
+    /// What is wrong with the line, where it can tell better than the driver.
+    fn line_error(&mut self) -> Option<tcp::Error>;
+}
+
+impl Bench<4> for ThreeFinger<Line> {
+    fn raw(&self) -> Option<Vec<u8>> {
+        self.raw_status().map(|block| block.to_vec())
+    }
+    fn accepted(&self) -> bool {
+        ThreeFinger::accepted(self)
+    }
+    fn outcome(&self) -> (Option<Task>, Option<(Task, Outcome)>) {
+        (self.task(), ThreeFinger::outcome(self))
+    }
+    fn reset(&mut self) {
+        ThreeFinger::reset(self);
+    }
+    fn release(&mut self, closing: bool) -> bool {
+        if !closing {
+            self.automatic_release();
+        }
+        !closing
+    }
+    fn set_mode(&mut self, mode: three_finger::Mode) -> bool {
+        ThreeFinger::set_mode(self, mode);
+        true
+    }
+    fn set_individual(&mut self, individual: bool) {
+        self.set_control(if individual {
+            Control::INDIVIDUAL
+        } else {
+            Control::SIMPLIFIED
+        });
+    }
+    fn names(&self) -> (&'static str, [&'static str; 4]) {
+        ("3-Finger gripper", crate::words::AXIS_NAMES)
+    }
+    fn facts(&self) -> Vec<(&'static str, String)> {
+        let Some(block) = self.raw_status() else {
+            return Vec::new();
+        };
+        let status = three_finger::Status::decode_any(&block);
+        let mut facts = vec![("mode", status.mode.name().to_owned())];
+        if status.going_to {
+            use three_finger::Progress;
+            let motion = match status.progress {
+                Progress::Moving => "the fingers move",
+                Progress::SomeShort => "stopped, one or two fingers short of their target",
+                Progress::AllShort => "stopped, all fingers short of their target",
+                Progress::AllThere => "stopped, all fingers at their target",
+            };
+            facts.push(("motion", motion.to_owned()));
+        }
+        facts
+    }
+    fn line_error(&mut self) -> Option<tcp::Error> {
+        self.serial_mut().error()
+    }
+}
+
+impl Bench<1> for TwoFinger<Line> {
+    fn raw(&self) -> Option<Vec<u8>> {
+        self.raw_status()
+            .map(|block| block[..two_finger::BLOCK].to_vec())
+    }
+    fn accepted(&self) -> bool {
+        TwoFinger::accepted(self)
+    }
+    fn outcome(&self) -> (Option<Task>, Option<(Task, Outcome)>) {
+        (self.task(), TwoFinger::outcome(self))
+    }
+    fn reset(&mut self) {
+        TwoFinger::reset(self);
+    }
+    fn release(&mut self, closing: bool) -> bool {
+        self.release_towards(if closing {
+            two_finger::Release::Closing
+        } else {
+            two_finger::Release::Opening
+        });
+        true
+    }
+    fn set_mode(&mut self, _: three_finger::Mode) -> bool {
+        false
+    }
+    fn set_individual(&mut self, _: bool) {}
+    fn names(&self) -> (&'static str, [&'static str; 1]) {
+        (self.model().name(), ["fingers"])
+    }
+    fn facts(&self) -> Vec<(&'static str, String)> {
+        // The controller's own fault has no public list.
+        self.raw_status()
+            .map(|block| block[2] >> 4)
+            .filter(|fault| *fault != 0)
+            .map(|fault| ("controller", format!("fault {fault:X}: see its manual")))
+            .into_iter()
+            .collect()
+    }
+    fn line_error(&mut self) -> Option<tcp::Error> {
+        self.serial_mut().error()
+    }
+}
+
+/// Whoever waits: the clock, and Ctrl-C.
+#[derive(Debug, Clone)]
+pub struct Waiter {
+    /// The driver's time.
+    pub clock: Clock,
+    /// Ends every wait early.
+    pub interrupt: Interrupt,
+}
+
+impl Waiter {
+    /// A waiter whose clock starts now.
+    pub fn new(interrupt: &Interrupt) -> Self {
+        Self {
+            clock: Clock::start(),
+            interrupt: interrupt.clone(),
+        }
+    }
+
+    /// Polls the driver until `step` breaks; `None` when the time is over or the end was asked for.
+    pub fn pump<B: Bench<X>, T, const X: usize>(
+        &self,
+        driver: &mut B,
+        time: Duration,
+        mut step: impl FnMut(
+            &mut B,
+            gripper::Instant,
+            Option<Result<Status<X>, gripper::Error>>,
+        ) -> ControlFlow<T>,
+    ) -> Option<T> {
+        let end = Instant::now() + time;
+        while Instant::now() < end {
+            let now = self.clock.now();
+            let heard = driver.poll(now);
+            if let ControlFlow::Break(value) = step(driver, now, heard) {
+                return Some(value);
+            }
+            if self.interrupt.sleep(LOOK) {
+                return None;
+            }
+        }
+        None
+    }
+
+    /// The first status.
+    ///
+    /// # Errors
+    /// What came instead of one, as the driver says it.
+    pub fn status<B: Bench<X>, const X: usize>(
+        &self,
+        driver: &mut B,
+    ) -> Result<Status<X>, Option<gripper::Error>> {
+        let mut last = None;
+        self.pump(driver, ANSWER_WAIT, |_, _, heard| match heard {
+            Some(Ok(status)) => ControlFlow::Break(status),
+            Some(Err(error)) => {
+                last = Some(error);
+                ControlFlow::Continue(())
+            }
+            None => ControlFlow::Continue(()),
+        })
+        .ok_or(last)
+    }
+
+    /// Waits until the task just asked for has ended.
+    ///
+    /// # Errors
+    /// A failure that says why it did not happen, and what to do.
+    pub fn finish<B: Bench<X>, const X: usize>(&self, driver: &mut B) -> Result<()> {
+        let mut last = None;
+        let ended = self.pump(driver, TASK_WAIT, |driver, _, heard| {
+            last = heard.and_then(Result::err).or(last);
+            match driver.outcome() {
+                (None, Some(outcome)) => ControlFlow::Break(outcome),
+                _ => ControlFlow::Continue(()),
+            }
+        });
+        match ended {
+            Some((_, Outcome::Done)) => Ok(()),
+            Some((task, Outcome::Failed(why))) => Err(failed(task, why, last)),
+            _ if self.interrupt.asked() => Err(Failure::new(
+                "interrupted; the gripper goes on by itself with what it has begun",
+                "`gauntlet gripper status`",
+            )
+            .into()),
+            _ => Err(Failure::new(
+                "the gripper did not finish in time",
+                "`gauntlet doctor --gripper …`",
+            )
+            .into()),
+        }
+    }
+}
+
+fn failed(
+    task: Task,
+    why: gripper::driver::Failure,
+    last: Option<gripper::Error>,
+) -> anyhow::Error {
+    use gripper::driver::Failure as Why;
+    match why {
+        Why::Fault(fault) => Failure::new(
+            format!(
+                "the {task} failed: fault {:02X}: {}",
+                fault.code(),
+                fault.sentence()
+            ),
+            fault.action(),
+        ),
+        Why::NotReady(gripper::Activation::Reset) => Failure::new(
+            format!("no {task}: the gripper is not activated"),
+            "`gauntlet gripper activate`: the fingers move",
+        ),
+        Why::NotReady(_) => Failure::new(
+            format!("no {task}: the gripper is busy activating or changing its mode"),
+            "again in a few seconds",
+        ),
+        Why::Deadline => {
+            let last = match last {
+                Some(gripper::Error::Link(error)) => format!("; last on the line: {error}"),
+                _ => String::new(),
+            };
+            Failure::new(
+                format!("the {task} did not end in time{last}"),
+                "clearing the fingers' way, then `gauntlet doctor --gripper …`",
+            )
+        }
+    }
+    .into()
+}

@@ -1,0 +1,255 @@
+//! `gauntlet gripper`: a gripper at a bench. Nothing moves but by the verb that says so.
+
+mod args;
+mod bench;
+mod motion;
+mod table;
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use gripper::driver::{ThreeFinger, TwoFinger};
+use gripper::registers::{Severity, two_finger};
+use gripper::{Activation, Status};
+
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::line::Line;
+use crate::tell::Tell;
+use crate::{out, say};
+
+pub use args::{Grasp, Gripper, Mode, Model, Move, Release, Target, Verb, Watch};
+pub(super) use bench::{Bench, Waiter};
+
+/// `watch` shows changes at most this often.
+const WATCH_STEP: Duration = Duration::from_millis(100);
+/// And says at least this often that it still does.
+const WATCH_BEAT: Duration = Duration::from_secs(1);
+
+impl Verb {
+    fn target(&self) -> &Target {
+        match self {
+            Self::Status(target) | Self::Activate(target) | Self::Reset(target) => target,
+            Self::Move(options) => &options.target,
+            Self::Mode(options) => &options.target,
+            Self::Release(options) => &options.target,
+            Self::Watch(options) => &options.target,
+        }
+    }
+}
+
+/// Runs one verb; every one ends within a deadline.
+///
+/// # Errors
+/// A failure that says why it did not happen and what to do.
+pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
+    let target = options.verb.target();
+    let is_tcp = crate::tcp::Address::parse(&target.gripper)?.is_some();
+    if is_tcp && target.model != Model::ThreeFinger {
+        return Err(Failure::usage(
+            "only the 3-Finger gripper speaks Modbus TCP",
+            "a serial port, or --model 3f",
+        )
+        .into());
+    }
+    let line = Line::open(&target.gripper, target.settings(), interrupt)?;
+    let config = line.driver_config(target.settings());
+    let model = match target.model {
+        Model::ThreeFinger => {
+            return act(ThreeFinger::new(line, config), config, options, interrupt);
+        }
+        Model::TwoFinger85 => two_finger::Model::TwoFinger85,
+        Model::TwoFinger140 => two_finger::Model::TwoFinger140,
+        Model::HandE => two_finger::Model::HandE,
+    };
+    act(
+        TwoFinger::new(line, model, config),
+        config,
+        options,
+        interrupt,
+    )
+}
+
+/// A verb under way.
+struct Doing<'a, B> {
+    driver: B,
+    target: &'a Target,
+    waiter: Waiter,
+    tell: Tell,
+}
+
+fn act<B: Bench<X>, const X: usize>(
+    mut driver: B,
+    config: gripper::driver::Config,
+    options: &Gripper,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let target = options.verb.target();
+    let waiter = Waiter::new(interrupt);
+    let status = match waiter.status(&mut driver) {
+        Ok(status) => status,
+        Err(last) => return Err(no_answer(target, &mut driver, config, last)),
+    };
+    let tell = Tell::new(target.json);
+    let mut doing = Doing {
+        driver,
+        target,
+        waiter,
+        tell,
+    };
+    match &options.verb {
+        Verb::Status(_) => {}
+        Verb::Activate(_) => doing.activate(&status)?,
+        Verb::Move(options) => motion::run(&mut doing, options, &status)?,
+        Verb::Mode(options) => doing.mode(options.mode)?,
+        Verb::Release(options) => doing.release(options.closing)?,
+        Verb::Reset(_) => {
+            tell.say(format_args!("resetting: the gripper lets go"));
+            doing.driver.reset();
+            doing.waiter.finish(&mut doing.driver)?;
+        }
+        Verb::Watch(options) => return doing.watch(options.seconds),
+    }
+    doing.show()
+}
+
+fn no_answer<B: Bench<X>, const X: usize>(
+    target: &Target,
+    driver: &mut B,
+    config: gripper::driver::Config,
+    last: Option<gripper::Error>,
+) -> anyhow::Error {
+    let place = target.gripper.display();
+    let (name, _) = driver.names();
+    if let Some(error) = driver.line_error() {
+        let what = format!(
+            "no {name} answers at {place} as unit {}: {error}",
+            config.unit
+        );
+        return Failure::new(what, error.next_step()).into();
+    }
+    let why = last.map_or_else(String::new, |error| format!(": {error}"));
+    Failure::new(
+        format!(
+            "no {name} answers on {place} as unit {} at {} baud{why}",
+            config.unit, config.baud
+        ),
+        format!("`gauntlet doctor --gripper {place}`, which finds out which layer fails"),
+    )
+    .into()
+}
+
+impl<B> Doing<'_, B> {
+    fn place(&self) -> String {
+        self.target.gripper.display().to_string()
+    }
+
+    fn activate<const X: usize>(&mut self, status: &Status<X>) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        let healthy = status.fault.severity() != Severity::Major;
+        if status.activation == Activation::Ready && healthy {
+            self.tell
+                .say(format_args!("it is activated already: nothing moves"));
+            return Ok(());
+        }
+        self.tell
+            .say(format_args!("activating: the fingers move, keep clear"));
+        self.driver.activate();
+        self.waiter.finish(&mut self.driver)
+    }
+
+    fn mode<const X: usize>(&mut self, mode: Grasp) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        if !self.driver.set_mode(mode.into()) {
+            let (name, _) = self.driver.names();
+            let what = format!("a {name} has no grasping modes");
+            return Err(Failure::usage(what, "`gauntlet gripper move`").into());
+        }
+        self.tell
+            .say(format_args!("changing the mode: the fingers move"));
+        self.waiter.finish(&mut self.driver)
+    }
+
+    fn release<const X: usize>(&mut self, closing: bool) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        if !self.driver.release(closing) {
+            return Err(Failure::usage(
+                "a 3-Finger gripper can only open in an automatic release",
+                "the same without --closing",
+            )
+            .into());
+        }
+        self.tell.say(format_args!(
+            "automatic release: the fingers move slowly; it ends in fault 0F, as it should"
+        ));
+        self.waiter.finish(&mut self.driver)
+    }
+
+    /// Reads once more and shows what is.
+    fn show<const X: usize>(&mut self) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        let status = self.waiter.status(&mut self.driver).map_err(|_| {
+            Failure::new(
+                "the gripper stopped answering",
+                "`gauntlet doctor --gripper …`",
+            )
+        })?;
+        let (place, raw) = (self.place(), self.target.raw);
+        if self.target.json {
+            return out::json(&table::json(&self.driver, &status, &place, raw));
+        }
+        for line in table::lines(&self.driver, &status, &place, raw) {
+            say!("{line}");
+        }
+        Ok(())
+    }
+
+    fn watch<const X: usize>(&mut self, time: Duration) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        let (place, raw, json) = (self.place(), self.target.raw, self.target.json);
+        let started = Instant::now();
+        let mut shown: Option<(Instant, String)> = None;
+        self.waiter
+            .pump(&mut self.driver, time, |driver, _, heard| {
+                let text = match heard {
+                    None => return ControlFlow::<()>::Continue(()),
+                    Some(Ok(status)) if json => {
+                        table::json(driver, &status, &place, raw).to_string()
+                    }
+                    Some(Ok(status)) => table::line(driver, &status, raw),
+                    Some(Err(error)) if json => {
+                        serde_json::json!({ "error": error.to_string() }).to_string()
+                    }
+                    Some(Err(error)) => match driver.line_error() {
+                        Some(error) => error.to_string(),
+                        None => error.to_string(),
+                    },
+                };
+                let due = shown.as_ref().is_none_or(|(at, last)| {
+                    let since = at.elapsed();
+                    since >= WATCH_BEAT || (since >= WATCH_STEP && *last != text)
+                });
+                if due {
+                    if json {
+                        say!("{text}");
+                    } else {
+                        say!("{:7.1} s  {text}", started.elapsed().as_secs_f32());
+                    }
+                    shown = Some((Instant::now(), text));
+                }
+                ControlFlow::Continue(())
+            });
+        Ok(())
+    }
+}

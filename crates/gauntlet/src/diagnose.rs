@@ -1,0 +1,79 @@
+//! Which layer fails: findings, one a layer, from the port up to what the device says about itself.
+//!
+//! Asking never moves or changes a gripper (status reads only). A glove's sensors are brought up, as every program that
+//! reads them does.
+
+mod glove;
+mod gripper;
+mod raw;
+
+use serde::Serialize;
+
+pub use glove::glove;
+pub use gripper::gripper;
+
+use crate::failure::Failure;
+
+/// How a finding is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// As it should be.
+    Good,
+    /// Worth knowing; nothing is broken.
+    Note,
+    /// Something to mend.
+    Wrong,
+}
+
+/// What was found at one layer.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Finding {
+    /// The layer: `port`, `line`, `unit`, `gripper`, `bridge`, `multiplexer`, `sensors`.
+    pub layer: &'static str,
+    /// How it is meant.
+    pub verdict: Verdict,
+    /// What it is.
+    pub what: String,
+    /// What to do about it.
+    #[serde(rename = "try", skip_serializing_if = "Option::is_none")]
+    pub next: Option<String>,
+}
+
+/// Findings in the order of the layers.
+#[derive(Debug, Clone, Default, Serialize)]
+#[serde(transparent)]
+pub struct Findings(pub Vec<Finding>);
+
+impl Findings {
+    fn good(&mut self, layer: &'static str, what: impl Into<String>) {
+        self.add(layer, Verdict::Good, what.into(), None);
+    }
+
+    fn note(&mut self, layer: &'static str, what: impl Into<String>, next: impl Into<String>) {
+        self.add(layer, Verdict::Note, what.into(), Some(next.into()));
+    }
+
+    fn wrong(&mut self, layer: &'static str, what: impl Into<String>, next: impl Into<String>) {
+        self.add(layer, Verdict::Wrong, what.into(), Some(next.into()));
+    }
+
+    fn failure(&mut self, layer: &'static str, failure: &Failure) {
+        self.wrong(layer, failure.to_string(), failure.next_step());
+    }
+
+    fn add(&mut self, layer: &'static str, verdict: Verdict, what: String, next: Option<String>) {
+        self.0.push(Finding {
+            layer,
+            verdict,
+            what,
+            next,
+        });
+    }
+
+    /// How many things are wrong.
+    pub fn faults(&self) -> usize {
+        let wrong = |finding: &&Finding| finding.verdict == Verdict::Wrong;
+        self.0.iter().filter(wrong).count()
+    }
+}
