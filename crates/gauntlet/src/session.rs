@@ -15,7 +15,8 @@ use bridge::telemetry::Sent;
 use bridge::{App, HoldReason, State, Telemetry, WeightsStore};
 use glove::scan::{self, Scanner};
 use gripper::driver::ThreeFinger;
-use gripper::{Duration, Instant};
+use gripper::{Activation, Duration, Instant};
+use serde::Serialize;
 
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
@@ -32,10 +33,50 @@ pub type PcApp = App<Pc, Port, ThreeFinger<Line>, MemorySlot, AXES>;
 const ORDERS: usize = 64;
 /// Records that may wait: about 10 s of a run.
 const RECORDS: usize = 4096;
-/// The hold must have gone out this long after the clutch opened; then the thread ends whatever the gripper does.
-const HOLD_WAIT: Duration = Duration::from_ticks(500_000);
-/// Cycles of the gripper after the clutch opened that prove that the hold arrived.
-const HOLD_CYCLES: u32 = 3;
+/// The hold must be confirmed this long after the clutch opened; then the thread ends whatever the gripper does.
+/// Some fifteen replies may be lost meanwhile.
+const HOLD_WAIT: Duration = Duration::from_ticks(1_500_000);
+
+/// How the gripper was left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stopped {
+    /// Nothing was ever commanded.
+    Untouched,
+    /// The hold left, and the gripper repeated its positions.
+    Held,
+    /// It was told to activate and is not ready: no command stops that.
+    Activating,
+    /// It was commanded before, and did not confirm the hold.
+    NotConfirmed,
+}
+
+impl Stopped {
+    /// What a person should know.
+    ///
+    /// # Errors
+    /// A failure where the gripper may still move.
+    pub fn judge(self) -> Result<&'static str> {
+        match self {
+            Self::Untouched => Ok("the gripper was not commanded"),
+            Self::Held => Ok("the gripper is held where it is"),
+            Self::Activating => Err(Failure::new(
+                "the gripper is activating and cannot be held: its fingers move until that is done",
+                "waiting for its end; in danger switch off the gripper's 24 V supply",
+            )
+            .into()),
+            Self::NotConfirmed => Err(Failure::new(
+                format!(
+                    "the hold was not confirmed: the gripper gave no right answer in {:.1} s",
+                    HOLD_WAIT.as_micros() as f64 / 1e6
+                ),
+                "look at the gripper: an axis comes to rest at most 40 counts from where it was; \
+                 in danger switch off its 24 V supply",
+            )
+            .into()),
+        }
+    }
+}
 
 /// What the bridge can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -71,7 +112,7 @@ pub struct Parts {
 /// A running bridge.
 #[derive(Debug)]
 pub struct Session {
-    thread: Option<JoinHandle<Result<()>>>,
+    thread: Option<JoinHandle<Stopped>>,
     orders: SyncSender<Order>,
     records: Receiver<Record>,
     snapshot: Arc<Mutex<Option<Snapshot>>>,
@@ -107,6 +148,7 @@ impl Session {
             lost: Arc::clone(&lost),
             seen: Seen::default(),
             ending: None,
+            activation_asked: false,
         };
         let thread = std::thread::Builder::new()
             .name("bridge".to_owned())
@@ -121,8 +163,7 @@ impl Session {
                 let config = parts.gripper.driver_config(Settings::default());
                 let gripper = ThreeFinger::new(parts.gripper, config);
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
-                worker.run(&mut app);
-                Ok(())
+                worker.run(&mut app)
             })
             .or_fail(
                 || "the bridge cannot start".to_owned(),
@@ -170,11 +211,11 @@ impl Session {
             .is_some_and(|thread| !thread.is_finished())
     }
 
-    /// Holds the gripper where it is and ends the bridge, within half a second.
+    /// Holds the gripper where it is and ends the bridge, within two seconds. Returns how the gripper was left.
     ///
     /// # Errors
     /// What ended the bridge before.
-    pub fn stop(&mut self) -> Result<()> {
+    pub fn stop(&mut self) -> Result<Stopped> {
         // A full queue is drained by the loop within 10 ms; the bound is for a loop that has ended.
         for _ in 0..100 {
             if self.order(Order::Stop) || !self.running() {
@@ -183,11 +224,10 @@ impl Session {
             std::thread::sleep(std::time::Duration::from_millis(5));
         }
         match self.thread.take().map(JoinHandle::join) {
-            None => Ok(()),
-            Some(Ok(result)) => result,
-            Some(Err(_)) => Err(Failure::new(
-                "the bridge stopped on a fault of its own",
-                "the same again with --log, and report what it says",
+            Some(Ok(stopped)) => Ok(stopped),
+            Some(Err(_)) | None => Err(Failure::new(
+                "the bridge stopped on a fault of its own: the gripper was not held",
+                "look at the gripper; then the same again with --log, and report what it says",
             )
             .into()),
         }
@@ -220,14 +260,9 @@ struct Worker {
     snapshot: Arc<Mutex<Option<Snapshot>>>,
     lost: Arc<AtomicU64>,
     seen: Seen,
-    ending: Option<Ending>,
-}
-
-/// When the hold was ordered, and what the gripper had answered by then.
-#[derive(Clone, Copy)]
-struct Ending {
-    since: Instant,
-    status_sequence: u32,
+    /// When the hold was ordered.
+    ending: Option<Instant>,
+    activation_asked: bool,
 }
 
 /// The sequence numbers already handed over.
@@ -241,19 +276,28 @@ struct Seen {
 }
 
 impl Worker {
-    fn run(mut self, app: &mut PcApp) {
+    fn run(mut self, app: &mut PcApp) -> Stopped {
+        let mut stopped = Stopped::NotConfirmed;
         app.run(|app| {
             self.obey(app);
             self.hand_over(app);
-            self.ended(app.telemetry())
+            match self.ended(app.telemetry()) {
+                Some(how) => stopped = how,
+                None => return false,
+            }
+            true
         });
+        stopped
     }
 
     fn obey(&mut self, app: &mut PcApp) {
         loop {
             match self.orders.try_recv() {
                 Ok(Order::Engage) if self.ending.is_none() => app.engage(),
-                Ok(Order::Activate) if self.ending.is_none() => app.activate(),
+                Ok(Order::Activate) if self.ending.is_none() => {
+                    self.activation_asked = true;
+                    app.activate();
+                }
                 Ok(Order::Calibrate) if self.ending.is_none() => app.calibrate_flat_hand(),
                 Ok(Order::Engage | Order::Activate | Order::Calibrate) => {}
                 Ok(Order::Release) => app.release(),
@@ -267,31 +311,37 @@ impl Worker {
     fn end(&mut self, app: &mut PcApp) {
         if self.ending.is_none() {
             app.release();
-            let telemetry = app.telemetry();
-            self.ending = Some(Ending {
-                since: telemetry.now,
-                status_sequence: telemetry.status_sequence,
-            });
+            self.ending = Some(app.telemetry().now);
         }
     }
 
-    /// Whether the hold has arrived, or the wait for it is over.
-    fn ended(&self, telemetry: &Telemetry<AXES>) -> bool {
-        self.ending.is_some_and(|ending| {
-            let answered = telemetry
-                .status_sequence
-                .wrapping_sub(ending.status_sequence);
-            let waited = telemetry.now.checked_duration_since(ending.since);
-            answered >= HOLD_CYCLES || waited.is_some_and(|waited| waited >= HOLD_WAIT)
-        })
+    /// How the gripper is left: as soon as that is sure, or the wait for it is over.
+    fn ended(&self, telemetry: &Telemetry<AXES>) -> Option<Stopped> {
+        let since = self.ending?;
+        let ready = telemetry
+            .status
+            .is_some_and(|status| status.activation == Activation::Ready);
+        if self.activation_asked && !ready {
+            return Some(Stopped::Activating);
+        }
+        if telemetry.sent_sequence == 0 {
+            return Some(Stopped::Untouched);
+        }
+        if hold_confirmed(telemetry, since) {
+            return Some(Stopped::Held);
+        }
+        let waited = telemetry.now.checked_duration_since(since);
+        waited
+            .is_some_and(|waited| waited >= HOLD_WAIT)
+            .then_some(Stopped::NotConfirmed)
     }
 
     fn hand_over(&mut self, app: &mut PcApp) {
         let telemetry = *app.telemetry();
-        if telemetry.frame_sequence != self.seen.frame {
-            if let Some(frame) = frame_record(&telemetry) {
-                self.send(Record::Frame(Box::new(frame)));
-            }
+        if telemetry.frame_sequence != self.seen.frame
+            && let Some(frame) = frame_record(&telemetry)
+        {
+            self.send(Record::Frame(Box::new(frame)));
         }
         if let Some(sent) = telemetry.sent
             && telemetry.sent_sequence != self.seen.sent
@@ -337,6 +387,17 @@ impl Worker {
             self.lost.fetch_add(1, Ordering::Relaxed);
         }
     }
+}
+
+/// Whether a hold left after `since`, and a later status repeats its positions.
+fn hold_confirmed(telemetry: &Telemetry<AXES>, since: Instant) -> bool {
+    let (Some(sent), Some(status)) = (&telemetry.sent, &telemetry.status) else {
+        return false;
+    };
+    !sent.follows
+        && sent.at >= since
+        && status.stamp > sent.at
+        && status.echo == sent.motion.position
 }
 
 /// Whether an event is something wrong, or merely something that happened.
