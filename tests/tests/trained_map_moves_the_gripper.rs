@@ -59,9 +59,9 @@ impl Bench {
             [MemorySlot::new(), MemorySlot::new()],
             bridge::app::expected(4),
         );
-        store.begin(image.len()).unwrap();
-        store.chunk(0, image).unwrap();
-        store.commit().unwrap();
+        store.begin(image.len()).expect("room");
+        store.chunk(0, image).expect("bytes");
+        store.commit().expect("a sound image");
         let app = App::new(
             Machine(clock.clone()),
             Scanner::new(glove_wire, glove::scan::Config::default()),
