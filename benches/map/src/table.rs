@@ -140,7 +140,14 @@ fn peers(network: &Network) -> Result<Vec<Contender<'_>>, String> {
     })];
     let mut add = |name: &'static str, mut eval: Peer| {
         let (q, mut expected) = (&network.inputs[0], [0.0; 4]);
-        textbook(&network.w1, &network.b1, &network.w2, &network.b2, q, &mut expected);
+        textbook(
+            &network.w1,
+            &network.b1,
+            &network.w2,
+            &network.b2,
+            q,
+            &mut expected,
+        );
         let y = eval(q).map_err(|error| format!("{name}: {error}"))?;
         if y.iter().zip(&expected).any(|(a, b)| (a - b).abs() > 0.01) {
             return Err(format!("{name} computes {y:?}, not {expected:?}"));

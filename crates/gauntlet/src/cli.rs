@@ -221,7 +221,7 @@ pub struct Teleop {
     /// The glove's serial port.
     #[arg(long, value_name = "PORT")]
     pub glove: PathBuf,
-    /// The gripper's serial port, or tcp:HOST[:PORT].
+    /// The gripper's serial port, or `tcp:HOST[:PORT]`.
     #[arg(long, value_name = "PORT")]
     pub gripper: PathBuf,
     /// The trained model.

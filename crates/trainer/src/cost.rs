@@ -3,7 +3,7 @@
 //! HAE = mean over Q of ½‖q − g(f(q))‖² + λ1·mean ‖J‖²_F + λ2·Pin + λ3·(UCD(X, f(Q)) + α·UCD(Q, g(X))).
 //! ‖J‖² has no ½ (as Eq. 2 prints it); without pairs Pin is 0. The prose under Eq. 5 swaps rows and columns, the formula is right.
 //!
-//! [`reference`] has the plain implementation that everything fast is tested against.
+//! [`mod@reference`] has the plain implementation that everything fast is tested against.
 
 pub(crate) mod engine;
 pub mod fast;

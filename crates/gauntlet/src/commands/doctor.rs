@@ -23,7 +23,7 @@ Nothing moves: a gripper is only read. A glove's sensors are brought up. A gripp
 is looked for at other speeds and under every unit number, which takes up to 15 seconds.
 Exit code 1 when something is wrong.")]
 pub struct Doctor {
-    /// The gripper's serial port, or tcp:HOST[:PORT].
+    /// The gripper's serial port, or `tcp:HOST[:PORT]`.
     #[arg(long, value_name = "PORT")]
     pub gripper: Option<PathBuf>,
     /// The glove's serial port.

@@ -65,7 +65,7 @@ pub enum Model {
 /// Where the gripper is and how to talk about it.
 #[derive(Debug, Clone, Args)]
 pub struct Target {
-    /// The gripper's serial port, or tcp:HOST[:PORT] (3-Finger).
+    /// The gripper's serial port, or `tcp:HOST[:PORT]` (3-Finger).
     #[arg(long, value_name = "PORT")]
     pub gripper: PathBuf,
     /// Which gripper it is.
