@@ -37,7 +37,7 @@ impl Tract {
     pub fn eval(&mut self, q: &[f32; 25]) -> TractResult<[f32; 4]> {
         let q = Tensor::from_shape(&[1, 25], q)?;
         let y = self.state.run(tvec!(q.into()))?;
-        let y = y[0].try_as_plain()?.as_slice::<f32>()?;
+        let y = y[0].try_as_plain_ram()?.as_slice::<f32>()?;
         Ok([y[0], y[1], y[2], y[3]])
     }
 }
