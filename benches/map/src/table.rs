@@ -159,21 +159,24 @@ fn peers(network: &Network) -> Result<Vec<Contender<'_>>, String> {
     };
     let nalgebra = Nalgebra::new(network);
     add("nalgebra", Box::new(move |q| Ok(nalgebra.eval(q))))?;
+    // A library that fails is left out of the table, not the table of the run.
     #[cfg(feature = "candle")]
-    {
-        let candle = crate::candle::Candle::new(network).map_err(|error| error.to_string())?;
-        add(
+    match crate::candle::Candle::new(network) {
+        Ok(candle) => add(
             "candle",
             Box::new(move |q| candle.eval(q).map_err(|error| error.to_string())),
-        )?;
+        )
+        .unwrap_or_else(|error| eprintln!("left out: {error}")),
+        Err(error) => eprintln!("left out: candle: {error}"),
     }
     #[cfg(feature = "tract")]
-    {
-        let mut tract = crate::tract::Tract::new(network).map_err(|error| error.to_string())?;
-        add(
+    match crate::tract::Tract::new(network) {
+        Ok(mut tract) => add(
             "tract",
             Box::new(move |q| tract.eval(q).map_err(|error| error.to_string())),
-        )?;
+        )
+        .unwrap_or_else(|error| eprintln!("left out: {error}")),
+        Err(error) => eprintln!("left out: tract: {error}"),
     }
     Ok(contenders)
 }
