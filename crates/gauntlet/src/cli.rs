@@ -5,6 +5,8 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::host_link::Address;
+
 /// Operate a Robotiq 3-Finger gripper with a glove of 16 orientation sensors, or try it all without hardware.
 ///
 /// Without a verb, `gauntlet` runs the demo: it trains a map from hand poses to gripper positions, starts a virtual
@@ -46,6 +48,10 @@ pub enum Verb {
     Simulate(Simulate),
     /// Drive a gripper with a glove, through two serial ports.
     Teleop(Teleop),
+    /// Write a trained map into a bridge that runs on a chip.
+    Flash(Flash),
+    /// Look after a bridge that runs on a chip.
+    Bridge(Bridge),
     /// List the serial ports of this machine.
     Ports(Ports),
     /// Read, activate and move a gripper at a bench.
@@ -61,6 +67,7 @@ Examples:
   gauntlet demo
   gauntlet demo --poses my_hand.csv --log session.mcap
   gauntlet demo --seconds 60 --json > result.json
+  gauntlet demo --on-chip
 
 The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians
 (thumb_cmc_flex, thumb_cmc_abd, … little_dip_flex; docs/tool.md lists them).
@@ -81,6 +88,12 @@ pub struct Demo {
     /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
     #[arg(long)]
     pub no_start_pairs: bool,
+    /// Run the bridge's ARM firmware in QEMU instead of on this processor.
+    #[arg(long, conflicts_with = "log")]
+    pub on_chip: bool,
+    /// The firmware for --on-chip, instead of the one that `cargo xtask firmware` built.
+    #[arg(long, value_name = "ELF", requires = "on_chip")]
+    pub firmware: Option<PathBuf>,
     /// Print the summary as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
@@ -95,6 +108,8 @@ impl Default for Demo {
             seconds: Duration::from_secs(20),
             seed: 1,
             no_start_pairs: false,
+            on_chip: false,
+            firmware: None,
             json: false,
         }
     }
@@ -246,6 +261,116 @@ pub struct Teleop {
     #[arg(long, value_name = "FILE.mcap")]
     pub log: Option<PathBuf>,
     /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `flash`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet flash model.safetensors --bridge /dev/ttyUSB0
+  gauntlet flash model.safetensors --bridge unix:/tmp/gauntlet/host.sock --json
+  gauntlet flash weights.hae --bridge tcp:localhost:4000
+
+The bridge keeps its old weights until the new image is there, whole and checked: power may go at any moment.
+A broken line is waited for and opened again; the transfer goes on where the bridge says it was. At the end
+the bridge reads its flash and the CRC is compared. Refused while the clutch is closed.")]
+pub struct Flash {
+    /// A trained model (MODEL.safetensors) or a weights image.
+    #[arg(value_name = "MODEL|IMAGE")]
+    pub file: PathBuf,
+    /// The bridge: a serial port, unix:PATH or tcp:HOST:PORT.
+    #[arg(long, value_name = "PORT")]
+    pub bridge: Address,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Options of `bridge`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet bridge status --bridge /dev/ttyUSB0
+  gauntlet bridge engage --bridge /dev/ttyUSB0 --activate --seconds 30
+  gauntlet bridge monitor --bridge unix:/tmp/gauntlet/host.sock
+  gauntlet bridge log --bridge /dev/ttyUSB0 --out my_hand.csv --seconds 30
+  gauntlet bridge select 1 --bridge /dev/ttyUSB0
+
+One host at a time: a second one is refused while the first keeps the clutch closed or writes weights.")]
+pub struct Bridge {
+    /// What to do.
+    #[command(subcommand)]
+    pub what: BridgeVerb,
+}
+
+/// What can be done with a bridge on a chip.
+#[derive(Debug, Subcommand)]
+pub enum BridgeVerb {
+    /// Show what the bridge does, what its slots hold, and its counters.
+    Status {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+    },
+    /// Close the clutch and keep it closed: the gripper follows the hand.
+    Engage {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+        /// Activate the gripper if it is not: the fingers move.
+        #[arg(long)]
+        activate: bool,
+        /// End by itself after this many seconds (1 to 86400).
+        #[arg(long, value_name = "N", value_parser = run_time)]
+        seconds: Option<Duration>,
+    },
+    /// Watch hand and gripper; the clutch is not touched.
+    Monitor {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+        /// End by itself after this many seconds (1 to 86400).
+        #[arg(long, value_name = "N", value_parser = run_time)]
+        seconds: Option<Duration>,
+    },
+    /// Write the hand's joint angles, 20 a second, into a poses file that `train` takes.
+    Log {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+        /// The file; not one that exists.
+        #[arg(long, value_name = "FILE.csv")]
+        out: PathBuf,
+        /// End by itself after this many seconds (1 to 86400).
+        #[arg(long, value_name = "N", value_parser = run_time)]
+        seconds: Option<Duration>,
+    },
+    /// Make the image in a slot the active one.
+    Select {
+        /// The slot, 0 or 1.
+        #[arg(value_parser = clap::value_parser!(u8).range(0..=1))]
+        slot: u8,
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+    },
+    /// Restart the bridge.
+    Reboot {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+    },
+}
+
+/// Which bridge, and how to print.
+#[derive(Debug, Args)]
+pub struct BridgeAt {
+    /// The bridge: a serial port, unix:PATH or tcp:HOST:PORT.
+    #[arg(long, value_name = "PORT")]
+    pub bridge: Address,
+    /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
 }

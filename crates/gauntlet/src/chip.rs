@@ -1,0 +1,446 @@
+//! A bridge on a chip as a person watches it: heartbeat, telemetry, live view, and the counters' difference at the end.
+
+use std::io::Write;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use bridge::State;
+use bridge::protocol::message::{Counters, Sample, Status};
+use gripper::{Activation, Fault};
+use serde::Serialize;
+
+use crate::failure::{Failure, OrFail};
+use crate::host_link::{Error, HostLink};
+use crate::interrupt::Interrupt;
+use crate::live::{Axis, Finger, Key, Live, View};
+use crate::run::End;
+use crate::stats::{Percentiles, Rate, short_or_dash};
+use crate::words;
+
+/// Pause between two heartbeats, spent listening.
+const HEARTBEAT: Duration = Duration::from_millis(100);
+/// Pause between two questions for the status without heartbeats; a session ends after 2 s.
+const STATUS_EVERY: Duration = Duration::from_millis(500);
+/// Pause between two looks at the counters.
+const COUNT_EVERY: Duration = Duration::from_secs(1);
+/// Pause between two telemetry samples, ms.
+pub const SAMPLE_MS: u16 = 50;
+/// Heartbeats without an answer, in a row, after which nobody is there: 2 s.
+const MISSED_BEATS: u32 = 20;
+/// Counts of position that are a motion.
+const MOVED_COUNTS: u8 = 4;
+
+/// How a watch goes.
+#[derive(Debug)]
+pub struct Options {
+    /// Heading of the view.
+    pub title: &'static str,
+    /// When it ends by itself.
+    pub seconds: Option<Duration>,
+    /// Whether the clutch is kept closed.
+    pub engage: bool,
+    /// No view at all.
+    pub quiet: bool,
+}
+
+/// What was seen.
+#[derive(Debug, Clone, Serialize)]
+pub struct Summary {
+    /// How long, seconds.
+    pub seconds: f64,
+    /// Frames the bridge took from the glove.
+    pub frames: u32,
+    /// Frames answered with a command that follows the hand.
+    pub answered_frames: u32,
+    /// Commands that left the bridge.
+    pub commands: u32,
+    /// Statuses of the gripper.
+    pub gripper_cycles: u32,
+    /// Cycles of the gripper that ended in an error.
+    pub gripper_errors: u32,
+    /// How often motion was held.
+    pub holds: u32,
+    /// Faults of the gripper.
+    pub faults: u32,
+    /// Bytes lost in the chip's queues: host, glove, gripper.
+    pub bytes_lost: [u32; 3],
+    /// Telemetry samples received here.
+    pub samples: u64,
+    /// Half of the samples' latencies, oldest sensor sample to command, were below, µs.
+    pub latency_p50_us: Option<u64>,
+    /// The same for 99 of 100.
+    pub latency_p99_us: Option<u64>,
+    /// Seconds until the gripper first moved while following.
+    pub first_motion_s: Option<f64>,
+}
+
+impl Summary {
+    /// The lines a person reads.
+    pub fn lines(&self) -> Vec<String> {
+        let rate = |count: u32| f64::from(count) / self.seconds.max(1e-3);
+        vec![
+            format!(
+                "rates      glove {:.1} scans/s ({}), gripper {:.1} cycles/s ({})",
+                rate(self.frames),
+                self.frames,
+                rate(self.gripper_cycles),
+                self.gripper_cycles
+            ),
+            format!(
+                "answered   {} of {} glove frames got a gripper command that follows the hand",
+                self.answered_frames, self.frames
+            ),
+            format!(
+                "latency    oldest sample to command, of {} telemetry samples: p50 {}, p99 {}",
+                self.samples,
+                short_or_dash(self.latency_p50_us),
+                short_or_dash(self.latency_p99_us)
+            ),
+            format!(
+                "faults     {}; gripper line errors {}, holds {}; bytes lost in the chip's queues: host {}, glove {}, gripper {}",
+                self.faults,
+                self.gripper_errors,
+                self.holds,
+                self.bytes_lost[0],
+                self.bytes_lost[1],
+                self.bytes_lost[2]
+            ),
+        ]
+    }
+}
+
+/// A bridge that somebody watches.
+#[derive(Debug)]
+pub struct Watch<'a> {
+    link: &'a mut HostLink,
+    interrupt: &'a Interrupt,
+    clutch: bool,
+    missed: u32,
+    status: Option<Status>,
+    sample: Option<Sample>,
+    frames: Rate,
+    last_frame: Option<u32>,
+    latency: Percentiles,
+    samples: u64,
+    started: Instant,
+    start_positions: Option<Vec<u8>>,
+    first_motion: Option<Duration>,
+    counted: Option<(Instant, Counters)>,
+    cycles_per_s: f64,
+}
+
+impl<'a> Watch<'a> {
+    /// Watches the bridge behind `link`.
+    pub fn new(link: &'a mut HostLink, interrupt: &'a Interrupt) -> Self {
+        Self {
+            link,
+            interrupt,
+            clutch: false,
+            missed: 0,
+            status: None,
+            sample: None,
+            frames: Rate::default(),
+            last_frame: None,
+            latency: Percentiles::default(),
+            samples: 0,
+            started: Instant::now(),
+            start_positions: None,
+            first_motion: None,
+            counted: None,
+            cycles_per_s: 0.0,
+        }
+    }
+
+    /// Watches until the time is over or somebody asks for the end, then opens the clutch. `each` is given every sample.
+    ///
+    /// # Errors
+    /// What ended the line, the bridge's refusal, the terminal's or the file's fault.
+    pub fn run(
+        mut self,
+        options: &Options,
+        each: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
+    ) -> Result<(Summary, End)> {
+        let before = self.link.counters().map_err(Failure::from)?;
+        self.link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
+        self.started = Instant::now();
+        self.clutch = options.engage;
+        let watched = self.watch(options, each);
+        // Also after a fault: the clutch must not stay closed for its last quarter of a second.
+        if self.clutch {
+            let released = self.link.release();
+            if watched.is_ok() {
+                released.map_err(Failure::from)?;
+            }
+        }
+        let end = watched?;
+        let seconds = self.started.elapsed().as_secs_f64();
+        self.link.telemetry(0).map_err(Failure::from)?;
+        let after = self.link.counters().map_err(Failure::from)?;
+        Ok((self.summary(seconds, &before, &after), end))
+    }
+
+    fn watch(
+        &mut self,
+        options: &Options,
+        each: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
+    ) -> Result<End> {
+        let terminal = || "the terminal does not work".to_owned();
+        let next = "`gauntlet … | cat`, which prints lines instead";
+        let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
+        let mut asked_status: Option<Instant> = None;
+        loop {
+            let beat = Instant::now();
+            if self.clutch {
+                self.heartbeat()?;
+            } else if asked_status.is_none_or(|at| at.elapsed() >= STATUS_EVERY) {
+                asked_status = Some(beat);
+                self.status = Some(self.link.status().map_err(Failure::from)?);
+            }
+            self.count()?;
+            let rest = HEARTBEAT.saturating_sub(beat.elapsed());
+            for sample in self.link.listen(rest).map_err(Failure::from)? {
+                each(&sample).or_fail(
+                    || "the log cannot be written".to_owned(),
+                    "room on the disk",
+                )?;
+                self.take(sample);
+            }
+            for key in live.keys().or_fail(terminal, next)? {
+                self.obey(key, options)?;
+            }
+            live.show(|| self.view(options)).or_fail(terminal, next)?;
+            if self.interrupt.asked() {
+                return Ok(End::Asked);
+            }
+            if options
+                .seconds
+                .is_some_and(|time| self.started.elapsed() >= time)
+            {
+                return Ok(End::Time);
+            }
+        }
+    }
+
+    fn heartbeat(&mut self) -> Result<()> {
+        match self.link.engage().map_err(Failure::from)? {
+            Some(status) => {
+                self.missed = 0;
+                self.status = Some(status);
+            }
+            None => self.missed += 1,
+        }
+        if self.missed >= MISSED_BEATS {
+            return Err(Failure::from(Error::Silent {
+                address: self.link.address().clone(),
+                attempts: self.missed,
+            })
+            .into());
+        }
+        Ok(())
+    }
+
+    /// Once a second: the gripper's rate, from the bridge's own count.
+    fn count(&mut self) -> Result<()> {
+        let now = Instant::now();
+        match self.counted {
+            Some((at, _)) if now.duration_since(at) < COUNT_EVERY => return Ok(()),
+            _ => {}
+        }
+        let counters = self.link.counters().map_err(Failure::from)?;
+        if let Some((at, before)) = self.counted.replace((now, counters)) {
+            let cycles = counters.statuses.wrapping_sub(before.statuses);
+            self.cycles_per_s = f64::from(cycles) / now.duration_since(at).as_secs_f64();
+        }
+        Ok(())
+    }
+
+    fn obey(&mut self, key: Key, options: &Options) -> Result<()> {
+        match key {
+            Key::End => self.interrupt.ask(),
+            Key::Clutch if options.engage => {
+                self.clutch = !self.clutch;
+                if !self.clutch {
+                    self.status = Some(self.link.release().map_err(Failure::from)?);
+                }
+            }
+            Key::Clutch | Key::Calibrate => {}
+        }
+        Ok(())
+    }
+
+    fn take(&mut self, sample: Sample) {
+        let now_us = sample.now_us;
+        let last = self.last_frame.replace(sample.frame_sequence);
+        let fresh = last.map_or(0, |last| sample.frame_sequence.wrapping_sub(last));
+        for _ in 0..fresh.min(16) {
+            self.frames.add(now_us);
+        }
+        self.samples += 1;
+        if sample.state.is_moving() {
+            if let Some(us) = sample.latency_us {
+                self.latency.add(us.into());
+            }
+            self.look_for_motion(&sample);
+        }
+        self.sample = Some(sample);
+    }
+
+    fn look_for_motion(&mut self, sample: &Sample) {
+        if self.first_motion.is_some() || sample.position.is_empty() {
+            return;
+        }
+        let start = self
+            .start_positions
+            .get_or_insert_with(|| sample.position.to_vec());
+        let moved = start
+            .iter()
+            .zip(&sample.position)
+            .any(|(start, now)| start.abs_diff(*now) >= MOVED_COUNTS);
+        if moved {
+            self.first_motion = Some(self.started.elapsed());
+        }
+    }
+
+    fn summary(&self, seconds: f64, before: &Counters, after: &Counters) -> Summary {
+        let grown = |of: fn(&Counters) -> u32| of(after).wrapping_sub(of(before));
+        Summary {
+            seconds,
+            frames: grown(|c| c.frames),
+            answered_frames: grown(|c| c.answered_frames),
+            commands: grown(|c| c.commands),
+            gripper_cycles: grown(|c| c.statuses),
+            gripper_errors: grown(|c| c.gripper_errors),
+            holds: grown(|c| c.holds),
+            faults: grown(|c| c.faults),
+            bytes_lost: after.bytes_lost,
+            samples: self.samples,
+            latency_p50_us: self.latency.at(0.5),
+            latency_p99_us: self.latency.at(0.99),
+            first_motion_s: self.first_motion.map(|after| after.as_secs_f64()),
+        }
+    }
+
+    fn view(&mut self, options: &Options) -> View {
+        let now_us = self.sample.as_ref().map_or(0, |sample| sample.now_us);
+        let state = self
+            .sample
+            .as_ref()
+            .map(|sample| sample.state)
+            .or(self.status.as_ref().map(|status| status.state));
+        View {
+            title: options.title.to_owned(),
+            elapsed: self.started.elapsed(),
+            total: options.seconds,
+            state: state.as_ref().map_or("starting", State::name).to_owned(),
+            following: state.is_some_and(|state| state.is_moving()),
+            fingers: self.sample.as_ref().map(fingers).unwrap_or_default(),
+            axes: self.sample.as_ref().map(axes).unwrap_or_default(),
+            frames_per_s: self.frames.now(now_us),
+            cycles_per_s: self.cycles_per_s,
+            latency_p50: self.latency.at(0.5),
+            latency_p99: self.latency.at(0.99),
+            dropped: 0,
+            faults: self.faults(state),
+            fault_count: self
+                .counted
+                .map_or(0, |(_, counters)| counters.faults.into()),
+            keys: if options.engage {
+                "space: close or open the clutch   q: open it and end"
+            } else {
+                "q: end"
+            },
+        }
+    }
+
+    fn faults(&self, state: Option<State>) -> Vec<String> {
+        let mut faults: Vec<String> = match state {
+            Some(state @ (State::Holding(_) | State::SafeAction(_) | State::Faulted(_))) => {
+                vec![state.to_string()]
+            }
+            _ => Vec::new(),
+        };
+        if let Some(status) = &self.status {
+            faults.extend(standing_faults(status));
+        }
+        faults
+    }
+}
+
+/// What is wrong with the bridge's devices now.
+pub fn standing_faults(status: &Status) -> Vec<String> {
+    let mut faults = Vec::new();
+    if !status.glove_answers {
+        faults.push("the glove sends no frames".to_owned());
+    }
+    match &status.gripper {
+        None => faults.push("the gripper does not answer".to_owned()),
+        Some(gripper) => {
+            if gripper.activation != Activation::Ready {
+                faults.push(format!(
+                    "the gripper is {}",
+                    words::activation(gripper.activation)
+                ));
+            }
+            if gripper.fault != Fault::None {
+                faults.push(format!(
+                    "gripper fault {:02X}: {}; {}",
+                    gripper.fault.code(),
+                    gripper.fault.sentence(),
+                    gripper.fault.action()
+                ));
+            }
+        }
+    }
+    faults
+}
+
+fn fingers(sample: &Sample) -> Vec<Finger> {
+    let limits = &glove::hand::LIMITS;
+    words::FINGER_NAMES
+        .iter()
+        .enumerate()
+        .map(|(finger, name)| Finger {
+            name,
+            angles: core::array::from_fn(|joint| sample.angles[5 * finger + joint]),
+            limits: core::array::from_fn(|joint| limits[5 * finger + joint]),
+            good: true,
+        })
+        .collect()
+}
+
+fn axes(sample: &Sample) -> Vec<Axis> {
+    words::AXIS_NAMES
+        .iter()
+        .enumerate()
+        .map(|(axis, name)| Axis {
+            name,
+            asked: sample.command.get(axis).copied(),
+            reached: sample.position.get(axis).copied(),
+            word: "",
+        })
+        .collect()
+}
+
+/// Head of [`write_row`]'s rows, that of a poses file.
+///
+/// # Errors
+/// The file's fault.
+pub fn write_head(out: &mut impl Write) -> std::io::Result<()> {
+    write!(out, "time_s")?;
+    for name in glove::hand::JOINT_NAMES {
+        write!(out, ",{name}")?;
+    }
+    writeln!(out)
+}
+
+/// One sample as a row of a poses file: the bridge's time and the 25 joint angles.
+///
+/// # Errors
+/// The file's fault.
+pub fn write_row(out: &mut impl Write, sample: &Sample) -> std::io::Result<()> {
+    write!(out, "{:.6}", sample.now_us as f64 / 1e6)?;
+    for angle in sample.angles {
+        write!(out, ",{angle}")?;
+    }
+    writeln!(out)
+}

@@ -1,0 +1,334 @@
+//! The host's end of the host protocol (docs/protocol.md): one request at a time, every wait with a deadline.
+//!
+//! A request whose reply does not come is sent again with the same sequence number, so that the bridge never does it
+//! twice; after [`ATTEMPTS`] the bridge counts as silent. Every frame starts with a zero, which ends whatever noise came
+//! before it. [`flash`](HostLink::flash) opens a broken line again and goes on where the bridge says it was.
+
+mod error;
+mod flash;
+mod line;
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use bridge::protocol::frame::{self, Decoder};
+use bridge::protocol::message::{
+    Answer, Call, Counters, FromBridge, Hello, Refusal, Reply, Request, Sample, Slots, Status,
+    VERSION,
+};
+
+pub use error::{Error, refusal_words};
+pub use flash::Flashed;
+pub use line::Address;
+use line::Line;
+
+/// Times a request is sent before the bridge counts as silent.
+pub const ATTEMPTS: u32 = 5;
+/// For a reply; a chunk takes 46 ms of a line at 115200 baud.
+const REPLY_WAIT: Duration = Duration::from_millis(300);
+/// For a reply to what erases or checks flash; an erase block of a real chip takes up to 2 s.
+const FLASH_WAIT: Duration = Duration::from_secs(3);
+/// For a heartbeat: the next one is due then.
+const HEARTBEAT_WAIT: Duration = Duration::from_millis(100);
+/// A session that another host let go of ends after 2 s.
+const BUSY_WAIT: Duration = Duration::from_millis(2_500);
+const BUSY_PAUSE: Duration = Duration::from_millis(250);
+/// Samples kept until somebody takes them; older ones go first.
+const SAMPLES: usize = 256;
+
+/// A conversation with a bridge.
+#[derive(Debug)]
+pub struct HostLink {
+    address: Address,
+    line: Option<Line>,
+    decoder: Decoder,
+    session: u32,
+    sequence: u16,
+    hello: Option<Hello>,
+    samples: VecDeque<Sample>,
+    repeats: u32,
+}
+
+impl HostLink {
+    /// Opens the line and says hello.
+    ///
+    /// # Errors
+    /// The line's fault, silence, or the bridge's refusal (another version, another host).
+    pub fn connect(address: &Address) -> Result<Self, Error> {
+        let mut link = Self {
+            address: address.clone(),
+            line: None,
+            decoder: Decoder::new(),
+            session: new_session(),
+            sequence: 0,
+            hello: None,
+            samples: VecDeque::new(),
+            repeats: 0,
+        };
+        link.reconnect()?;
+        Ok(link)
+    }
+
+    /// Opens the line again and goes on with the same session.
+    ///
+    /// # Errors
+    /// As [`HostLink::connect`].
+    pub fn reconnect(&mut self) -> Result<(), Error> {
+        // The old line goes first: a serial port is open once only.
+        self.line = None;
+        self.decoder = Decoder::new();
+        self.line = Some(Line::open(&self.address)?);
+        let patience = Instant::now() + BUSY_WAIT;
+        loop {
+            match self.say_hello() {
+                Err(Error::Refused(Refusal::Busy { .. })) if Instant::now() < patience => {
+                    std::thread::sleep(BUSY_PAUSE);
+                }
+                result => return result,
+            }
+        }
+    }
+
+    fn say_hello(&mut self) -> Result<(), Error> {
+        match self.call(&Call::Hello { version: VERSION })? {
+            Answer::Hello(hello) => {
+                self.hello = Some(hello);
+                Ok(())
+            }
+            other => Err(confused(&other)),
+        }
+    }
+
+    /// What the bridge is.
+    pub fn hello(&self) -> Option<Hello> {
+        self.hello
+    }
+
+    /// Where it is.
+    pub fn address(&self) -> &Address {
+        &self.address
+    }
+
+    /// Requests that were sent again because no reply came.
+    pub fn repeats(&self) -> u32 {
+        self.repeats
+    }
+
+    /// Asks, and waits for the answer.
+    ///
+    /// # Errors
+    /// The line's fault, silence after [`ATTEMPTS`], or the bridge's refusal.
+    pub fn call(&mut self, call: &Call<'_>) -> Result<Answer, Error> {
+        let wait = match call {
+            Call::WeightsBegin { .. }
+            | Call::WeightsCommit
+            | Call::SelectSlot { .. }
+            | Call::Slots => FLASH_WAIT,
+            _ => REPLY_WAIT,
+        };
+        self.ask(call, wait, ATTEMPTS)
+    }
+
+    fn ask(&mut self, call: &Call<'_>, wait: Duration, attempts: u32) -> Result<Answer, Error> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let request = Request {
+            session: self.session,
+            sequence: self.sequence,
+            call: call.clone(),
+        };
+        let bytes = framed(&request)?;
+        for attempt in 0..attempts {
+            self.repeats += u32::from(attempt > 0);
+            let deadline = Instant::now() + wait;
+            self.send(&bytes, deadline)?;
+            while let Some(reply) = self.receive(deadline)? {
+                if reply.session == self.session && reply.sequence == self.sequence {
+                    return reply.answer.map_err(Error::Refused);
+                }
+            }
+        }
+        Err(Error::Silent {
+            address: self.address.clone(),
+            attempts,
+        })
+    }
+
+    fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), Error> {
+        let line = self.line.as_mut().ok_or(Error::Lost)?;
+        line.write(bytes, deadline).map_err(|_| self.lose())
+    }
+
+    fn lose(&mut self) -> Error {
+        self.line = None;
+        Error::Lost
+    }
+
+    /// The next reply by `deadline`; samples on the way are kept.
+    fn receive(&mut self, deadline: Instant) -> Result<Option<Reply>, Error> {
+        let mut byte = [0];
+        loop {
+            let line = self.line.as_mut().ok_or(Error::Lost)?;
+            match line.read(&mut byte, deadline) {
+                Ok(0) => return Ok(None),
+                Ok(_) => {}
+                Err(_) => return Err(self.lose()),
+            }
+            let message = self
+                .decoder
+                .push(byte[0], |message| postcard::from_bytes(message).ok());
+            match message.flatten() {
+                Some(FromBridge::Reply(reply)) => return Ok(Some(reply)),
+                Some(FromBridge::Sample(sample)) => {
+                    if self.samples.len() == SAMPLES {
+                        self.samples.pop_front();
+                    }
+                    self.samples.push_back(sample);
+                }
+                None => {}
+            }
+        }
+    }
+
+    /// Telemetry samples that have come, after listening for `time`.
+    ///
+    /// # Errors
+    /// The line's fault.
+    pub fn listen(&mut self, time: Duration) -> Result<Vec<Sample>, Error> {
+        let deadline = Instant::now() + time;
+        // Replies that come now answer requests given up before.
+        while self.receive(deadline)?.is_some() {}
+        Ok(self.samples.drain(..).collect())
+    }
+
+    /// Closes the clutch for 250 ms, or keeps it closed. `None` when no answer came in 100 ms: say it again then.
+    ///
+    /// # Errors
+    /// The line's fault, or the bridge's refusal.
+    pub fn engage(&mut self) -> Result<Option<Status>, Error> {
+        // Not repeated: a repetition is not done again by the bridge, and would not keep the clutch closed.
+        match self.ask(&Call::Engage, HEARTBEAT_WAIT, 1) {
+            Ok(Answer::Status(status)) => Ok(Some(status)),
+            Ok(other) => Err(confused(&other)),
+            Err(Error::Silent { .. }) => Ok(None),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Opens the clutch.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn release(&mut self) -> Result<Status, Error> {
+        as_status(self.call(&Call::Release)?)
+    }
+
+    /// What the bridge is doing.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn status(&mut self) -> Result<Status, Error> {
+        as_status(self.call(&Call::Status)?)
+    }
+
+    /// What it has counted.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn counters(&mut self) -> Result<Counters, Error> {
+        match self.call(&Call::Counters)? {
+            Answer::Counters(counters) => Ok(counters),
+            other => Err(confused(&other)),
+        }
+    }
+
+    /// What its slots hold.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn slots(&mut self) -> Result<Slots, Error> {
+        as_slots(self.call(&Call::Slots)?)
+    }
+
+    /// Makes the image in `slot` the active one.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn select(&mut self, slot: u8) -> Result<Slots, Error> {
+        as_slots(self.call(&Call::SelectSlot { slot })?)
+    }
+
+    /// Samples every `period_ms` milliseconds from now on; 0 ends them.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn telemetry(&mut self, period_ms: u16) -> Result<(), Error> {
+        self.done(&Call::Telemetry { period_ms })
+    }
+
+    /// Activates the gripper, which **moves**.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn activate(&mut self) -> Result<(), Error> {
+        self.done(&Call::Activate)
+    }
+
+    /// Restarts the bridge.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn reboot(&mut self) -> Result<(), Error> {
+        self.done(&Call::Reboot)
+    }
+
+    fn done(&mut self, call: &Call<'_>) -> Result<(), Error> {
+        match self.call(call)? {
+            Answer::Done => Ok(()),
+            other => Err(confused(&other)),
+        }
+    }
+}
+
+fn as_status(answer: Answer) -> Result<Status, Error> {
+    match answer {
+        Answer::Status(status) => Ok(status),
+        other => Err(confused(&other)),
+    }
+}
+
+fn as_slots(answer: Answer) -> Result<Slots, Error> {
+    match answer {
+        Answer::Slots(slots) => Ok(slots),
+        other => Err(confused(&other)),
+    }
+}
+
+fn confused(answer: &Answer) -> Error {
+    let text = format!("{answer:?}");
+    let name = text.split([' ', '(']).next().unwrap_or_default();
+    Error::Confused(name.to_owned())
+}
+
+/// A number that two hosts hardly choose both.
+fn new_session() -> u32 {
+    let time = std::time::SystemTime::now()
+        .duration_since(std::time::UNIX_EPOCH)
+        .map_or(0, |time| time.subsec_nanos() ^ time.as_secs() as u32);
+    time ^ std::process::id().rotate_left(16)
+}
+
+/// A zero, which ends whatever came before, and the request's frame.
+fn framed(request: &Request<'_>) -> Result<Vec<u8>, Error> {
+    let mut scratch = [0; frame::SCRATCH];
+    let room = scratch
+        .get_mut(..frame::MAX_MESSAGE)
+        .ok_or(Error::TooLong)?;
+    let length = postcard::to_slice(request, room)
+        .map_err(|_| Error::TooLong)?
+        .len();
+    let mut out = [0; frame::MAX_FRAME];
+    let coded = frame::encode(&mut scratch, length, &mut out).map_err(|_| Error::TooLong)?;
+    let mut bytes = vec![0];
+    bytes.extend_from_slice(coded);
+    Ok(bytes)
+}
