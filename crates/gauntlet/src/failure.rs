@@ -38,6 +38,14 @@ impl Failure {
         }
     }
 
+    /// Somebody asked for the end before `what` was done.
+    pub fn interrupted(what: &str) -> Self {
+        Self::new(
+            format!("interrupted {what}; nothing was moved"),
+            "the same again",
+        )
+    }
+
     /// What a person can do next.
     pub fn next_step(&self) -> &str {
         &self.next

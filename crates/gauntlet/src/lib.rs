@@ -4,27 +4,25 @@
 //! |---|---|
 //! | [`cli`], [`commands`] | the command line and its verbs |
 //! | [`failure`], [`out`], [`tell`], [`progress`] | what a person reads |
+//! | [`outputs`] | what files may be written over |
 //! | [`port`], [`ports`], [`probe`] | serial ports: open, list, is anybody there |
-//! | [`line`], [`tcp`] | a gripper's line: a serial port or Modbus TCP |
+//! | [`mod@line`], [`tcp`] | a gripper's line: a serial port or Modbus TCP |
 //! | [`diagnose`] | which layer of a device fails |
 //! | [`platform`], [`slots`], [`session`] | the bridge on a PC: clock and wait, weights, thread and queues |
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
-//! | [`host_link`], [`chip`], [`emulator`] | a bridge on a chip: the host protocol, watching it, the firmware in QEMU |
 //! | [`poses`], [`training`], [`quality`], [`model`] | hand motion, the map and its measures |
 
-pub mod chip;
 pub mod cli;
 pub mod commands;
 pub mod diagnose;
-pub mod emulator;
 pub mod failure;
-pub mod host_link;
 pub mod interrupt;
 pub mod line;
 pub mod live;
 pub mod model;
 pub mod out;
+pub mod outputs;
 pub mod platform;
 pub mod port;
 pub mod ports;

@@ -1,12 +1,43 @@
 //! Printing that outlives its reader: `gauntlet … | head` ends quietly, not in a panic.
 
 use std::fmt::Arguments;
-use std::io::Write;
+use std::io::{ErrorKind, Write};
+use std::sync::OnceLock;
 
-/// One line to standard output. A reader that left is not an error.
+use anyhow::Result;
+
+use crate::failure::Failure;
+
+/// The first error of standard output, of this process.
+static FAULT: OnceLock<std::io::Error> = OnceLock::new();
+
+/// One line to standard output. What goes wrong is kept for [`closed`] and [`check`].
 pub fn line(text: Arguments<'_>) {
     let mut stdout = std::io::stdout().lock();
-    let _ = writeln!(stdout, "{text}").and_then(|()| stdout.flush());
+    if let Err(error) = writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
+        // Only the first counts.
+        let _ = FAULT.set(error);
+    }
+}
+
+/// Whether standard output takes nothing any more: its reader left, or its disk is full.
+pub fn closed() -> bool {
+    FAULT.get().is_some()
+}
+
+/// Whether everything was printed. A reader that left had enough: no error.
+///
+/// # Errors
+/// A failure where the system took a line for another reason not.
+pub fn check() -> Result<()> {
+    match FAULT.get() {
+        Some(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::new(
+            format!("standard output took not all of the result: {error}"),
+            "a place with room",
+        )
+        .into()),
+        _ => Ok(()),
+    }
 }
 
 /// One line to standard error.

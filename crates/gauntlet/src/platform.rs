@@ -131,3 +131,7 @@ impl bridge::Platform for Pc {
         }
     }
 }
+
+#[cfg(test)]
+#[path = "platform_tests.rs"]
+mod tests;

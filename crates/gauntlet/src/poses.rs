@@ -6,7 +6,8 @@ use std::sync::Arc;
 use anyhow::Result;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES, LIMITS};
 use rig::PoseSource;
-use trainer::data::{Matrix, Poses, read_poses, require_rows};
+use trainer::data::{Error, Matrix, Poses, read_poses, require_rows};
+use trainer::measures::NEIGHBOURS;
 use trainer::motion::{FRAMES, Generator, RATE_HZ};
 
 use crate::failure::told;
@@ -41,14 +42,7 @@ impl Motion {
     /// # Errors
     /// A failure that names file, column and row.
     pub fn open(path: Option<&Path>, seed: u64) -> Result<Self> {
-        let Some(path) = path else {
-            return Ok(Self::Generated { seed });
-        };
-        let poses = read_poses(path, &JOINT_NAMES).map_err(told)?;
-        Ok(Self::Recorded {
-            poses: Arc::new(poses),
-            name: path.display().to_string(),
-        })
+        Self::with_rows(path, seed, 1)
     }
 
     /// As [`Motion::open`], with rows enough to train on.
@@ -56,11 +50,32 @@ impl Motion {
     /// # Errors
     /// A failure that names the file and its number of rows.
     pub fn open_for_training(path: Option<&Path>, seed: u64) -> Result<Self> {
-        let motion = Self::open(path, seed)?;
-        if let (Self::Recorded { poses, .. }, Some(path)) = (&motion, path) {
-            require_rows(path, poses.rows.rows, LEAST_ROWS).map_err(told)?;
-        }
-        Ok(motion)
+        Self::with_rows(path, seed, LEAST_ROWS)
+    }
+
+    /// As [`Motion::open`], with rows enough to measure on: d-Knn looks at neighbours.
+    ///
+    /// # Errors
+    /// A failure that names the file and its number of rows.
+    pub fn open_for_measuring(path: &Path) -> Result<Self> {
+        Self::with_rows(Some(path), 0, NEIGHBOURS + 1)
+    }
+
+    fn with_rows(path: Option<&Path>, seed: u64, needed: usize) -> Result<Self> {
+        let Some(path) = path else {
+            return Ok(Self::Generated { seed });
+        };
+        let found = match read_poses(path, &JOINT_NAMES) {
+            Ok(poses) => poses,
+            // The reader asks for one row; say how many this work needs.
+            Err(Error::TooFewRows { .. }) => Poses::default(),
+            Err(other) => return Err(told(other)),
+        };
+        require_rows(path, found.rows.rows, needed).map_err(told)?;
+        Ok(Self::Recorded {
+            poses: Arc::new(found),
+            name: path.display().to_string(),
+        })
     }
 
     /// The frames to train on and to measure with, radians.

@@ -69,6 +69,9 @@ pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
             });
         }
     }
+    if interrupt.asked() {
+        return Err(Failure::interrupted("while the glove was looked for").into());
+    }
     Err(Failure::new(
         format!(
             "no glove answers on {}: asked its serial multiplexer (SC18IM) at {BAUD} and {RESET_BAUD} baud",
@@ -147,6 +150,9 @@ pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Line, Status<
             Some(Err(error)) => last_error = Some(error),
             None => {}
         }
+    }
+    if interrupt.asked() {
+        return Err(Failure::interrupted("while the gripper was looked for").into());
     }
     if let Some(error) = port.error() {
         return Err(Failure::new(

@@ -1,17 +1,12 @@
 //! How good a map is, in numbers a person can judge.
 
-use std::path::Path;
-
-use anyhow::Result;
 use rand::RngExt;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use trainer::data::{Matrix, require_rows};
-use trainer::measures::{Coverage, NEIGHBOURS, Test, measure};
+use trainer::data::Matrix;
+use trainer::measures::{Coverage, Test, measure};
 use trainer::model::{Model, Normalisation};
-
-use crate::failure::told;
 
 /// Least volume occupancy of a map worth driving with.
 pub const LEAST_OCCUPANCY: f64 = 0.90;
@@ -85,21 +80,23 @@ fn coverage(x: &Normalisation) -> Coverage {
     }
 }
 
-/// Gripper poses spread evenly over the configuration space, counts.
+/// Gripper poses spread evenly over the configuration space, counts: those to train on.
 pub fn targets(seed: u64) -> Matrix {
+    poses(seed, 0)
+}
+
+/// Others of the same kind, to measure with.
+pub fn measuring_targets(seed: u64) -> Matrix {
+    poses(seed, 1)
+}
+
+fn poses(seed: u64, stream: u64) -> Matrix {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
+    random.set_stream(stream);
     let rows: Vec<[f32; 4]> = (0..TARGETS)
         .map(|_| gripper::space::sample(|| random.random::<f32>()))
         .collect();
     Matrix::from_rows(&rows)
-}
-
-/// Refuses a file with fewer poses than d-Knn needs neighbours.
-///
-/// # Errors
-/// A failure that names the file and its rows.
-pub fn require_poses(path: &Path, frames: &Matrix) -> Result<()> {
-    require_rows(path, frames.rows, NEIGHBOURS + 1).map_err(told)
 }
 
 #[cfg(test)]
@@ -123,6 +120,7 @@ mod tests {
         }));
         assert_eq!(all, targets(3));
         assert_ne!(all, targets(4));
+        assert_ne!(all, measuring_targets(3));
     }
 
     #[test]

@@ -8,6 +8,9 @@ use gripper::{Motion, Status};
 /// Axes of the gripper the tool drives: the 3-Finger's fingers A, B, C and the scissor.
 pub const AXES: usize = 4;
 
+/// Their names, in files and views.
+pub const AXIS_NAMES: [&str; AXES] = ["finger_a", "finger_b", "finger_c", "scissor"];
+
 /// One sensor's part of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Imu {

@@ -16,8 +16,8 @@ use crate::failure::OrFail;
 use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
 use crate::platform::Clock;
-use crate::record::{AXES, Record, Sort};
-use crate::session::{Order, Session, Snapshot};
+use crate::record::{AXES, AXIS_NAMES, Record, Sort};
+use crate::session::{Order, Session, Snapshot, Stopped};
 use crate::session_log::{SessionLog, Written};
 use crate::{out, words};
 
@@ -26,7 +26,7 @@ pub use numbers::{Numbers, Summary};
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
-const HEARTBEAT: Duration = Duration::from_millis(100);
+const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
 /// Faults shown at once.
 const SHOWN_FAULTS: usize = 5;
 /// How long a fault stays on the view after it happened.
@@ -52,6 +52,17 @@ pub enum End {
     Time,
     /// A person asked for it.
     Asked,
+}
+
+/// What is left when a run is over.
+#[derive(Debug)]
+pub struct Finished {
+    /// Its numbers.
+    pub summary: Summary,
+    /// Its log.
+    pub log: Option<Written>,
+    /// How the gripper was left.
+    pub stopped: Stopped,
 }
 
 /// A session that somebody watches.
@@ -178,7 +189,8 @@ impl Run {
             }
             live.show(|| self.view(options, started.elapsed(), live_keys()))
                 .or_fail(terminal, next)?;
-            if self.interrupt.asked() {
+            // Nobody sees the lines any more: do not drive on unseen.
+            if self.interrupt.asked() || out::closed() {
                 return Ok(End::Asked);
             }
             if options
@@ -195,18 +207,22 @@ impl Run {
     ///
     /// # Errors
     /// What ended the bridge, or the log's fault.
-    pub fn finish(mut self) -> Result<(Summary, Option<Written>)> {
+    pub fn finish(mut self) -> Result<Finished> {
         let ended = self.session.stop();
         self.take_records();
         let lost = self.session.lost();
         let counters = self.session.snapshot().map(|s| s.counters);
         let log = self.log.take().map(SessionLog::finish).transpose();
-        ended?;
-        let written = log?.map(|mut written| {
+        let stopped = ended?;
+        let log = log?.map(|mut written| {
             written.lost += lost;
             written
         });
-        Ok((self.numbers.summary(counters), written))
+        Ok(Finished {
+            summary: self.numbers.summary(counters),
+            log,
+            stopped,
+        })
     }
 
     fn obey(&mut self, key: Key) {
@@ -226,8 +242,9 @@ impl Run {
     /// What has to be done every few milliseconds.
     fn round(&mut self) -> Result<()> {
         if !self.session.running() {
-            // Returns what ended it.
+            // Says what ended it.
             self.session.stop()?;
+            anyhow::bail!("the bridge ended");
         }
         let now = Instant::now();
         let due = self
@@ -374,7 +391,7 @@ fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
 fn axes(snapshot: &Snapshot) -> Vec<Axis> {
     (0..AXES)
         .map(|axis| Axis {
-            name: words::AXIS_NAMES[axis],
+            name: AXIS_NAMES[axis],
             asked: snapshot.command.map(|motion| motion.position[axis]),
             reached: snapshot.status.map(|status| status.position[axis]),
             word: snapshot

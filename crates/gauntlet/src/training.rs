@@ -14,7 +14,7 @@ use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::poses::Motion;
 use crate::progress::Progress;
-use crate::quality::{Quality, targets};
+use crate::quality::{Quality, measuring_targets, targets};
 use crate::record::AXES;
 
 /// Share of the frames that train; the rest measure (381 + 254 of the paper's 635).
@@ -114,7 +114,11 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
         Motion::Generated { .. } => "held-out frames of generated motion".to_owned(),
         Motion::Recorded { name, .. } => format!("held-out frames of {name}"),
     };
-    let quality = Quality::of(&model, &held_out, &targets, measured_on);
+    let measuring = measuring_targets(request.seed);
+    let quality = Quality::of(&model, &held_out, &measuring, measured_on);
+    if interrupt.asked() {
+        return Err(Failure::interrupted("while the map was measured: no model was made").into());
+    }
     describe(
         &mut model,
         &settings,
@@ -185,11 +189,10 @@ fn learn(
         }
     });
     result.map_err(|error| match error {
-        Error::Stopped { epoch } => Failure::new(
-            format!("the training was interrupted at epoch {epoch}; no model was made, nothing was moved"),
-            "the same again",
-        )
-        .into(),
+        Error::Stopped { epoch } => {
+            let what = format!("in the training, at epoch {epoch}: no model was made");
+            Failure::interrupted(&what).into()
+        }
         other => told(other),
     })
 }

@@ -5,9 +5,7 @@ use glove::scan::Health;
 use gripper::{Activation, Contact, Status};
 
 use crate::record::AXES;
-
-/// The gripper's axes as the views name them.
-pub const AXIS_NAMES: [&str; AXES] = ["finger A", "finger B", "finger C", "scissor"];
+pub use crate::record::AXIS_NAMES;
 
 /// The fingers, thumb first: each has five joint angles in a row.
 pub const FINGER_NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];

@@ -4,10 +4,14 @@
 mod support;
 
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use std::io::Read;
 use std::os::fd::OwnedFd;
-use std::process::Stdio;
+use std::process::{Child, Stdio};
+use std::thread::JoinHandle;
 use std::time::Duration;
-use support::{Simulation, command, finish, json, model, refusal, run, signal, text};
+use support::{
+    Simulation, command, finish, interrupt, json, model, refusal, run, text, until_line, wait,
+};
 
 /// A terminal with nobody behind it.
 fn silent_port() -> (OwnedFd, String) {
@@ -82,6 +86,7 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
     assert!(run["glove_frames"].as_u64() > Some(10), "{said}");
     assert!(run["gripper_cycles"].as_u64() > Some(30), "{said}");
     assert!(run["commands"].as_u64() > Some(0), "{said}");
+    assert_eq!(said["gripper"], "held", "{said}");
     let bytes = std::fs::read(&log).unwrap();
     let summary = mcap::Summary::read(&bytes)
         .unwrap()
@@ -100,6 +105,7 @@ fn nothing_moves_without_the_clutch() {
         &simulation.gripper(),
         &["--seconds", "1.5", "--json"],
     )));
+    assert_eq!(said["gripper"], "untouched", "{said}");
     assert_eq!(said["run"]["commands"], 0, "{said}");
     assert_eq!(said["run"]["frames_following"], 0, "{said}");
     assert_eq!(simulation.end(), Some(0));
@@ -118,30 +124,43 @@ fn engaging_a_gripper_that_is_not_activated_is_refused_with_the_way_out() {
     assert_eq!(simulation.end(), Some(0));
 }
 
-#[test]
-fn ctrl_c_while_driving_holds_and_finishes_the_log() {
-    let mut simulation = Simulation::start(true, true);
-    let log = simulation.folder.path().join("run.mcap");
+/// Starts `teleop --engage --activate` and waits until it has said `word`.
+fn driving(simulation: &Simulation, word: &str, log: &str) -> (Child, JoinHandle<String>) {
     let arguments = teleop(
         &simulation.glove(),
         &simulation.gripper(),
-        &["--engage", "--activate", "--log", log.to_str().unwrap()],
+        &["--engage", "--activate", "--log", log],
     );
-    let child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+    let mut child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(Duration::from_secs(6));
-    signal(&child, "INT");
-    let output = finish(child);
-    let said = text(&output.stdout);
-    assert_eq!(
-        output.status.code(),
-        Some(0),
-        "{said} {}",
-        text(&output.stderr)
-    );
+    let said = until_line(child.stdout.take().unwrap(), word);
+    (child, said)
+}
+
+fn ended(mut child: Child) -> (Option<i32>, String) {
+    let code = wait(&mut child).code();
+    let mut stderr = String::new();
+    child
+        .stderr
+        .take()
+        .unwrap()
+        .read_to_string(&mut stderr)
+        .unwrap();
+    (code, stderr)
+}
+
+#[test]
+fn ctrl_c_while_driving_holds_and_finishes_the_log() {
+    let mut simulation = Simulation::start(true, true);
+    let log = simulation.folder.path().join("run.mcap");
+    let (child, said) = driving(&simulation, "following", log.to_str().unwrap());
+    interrupt(&child);
+    let (code, stderr) = ended(child);
+    let said = said.join().unwrap();
+    assert_eq!(code, Some(0), "{said} {stderr}");
     assert!(said.contains("the gripper is held where it is"), "{said}");
     let bytes = std::fs::read(&log).unwrap();
     let commands: Vec<serde_json::Value> = mcap::MessageStream::new(&bytes)
@@ -156,6 +175,51 @@ fn ctrl_c_while_driving_holds_and_finishes_the_log() {
         "the last command is no hold: {last}"
     );
     assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn a_hold_that_the_gripper_does_not_confirm_is_told_as_a_failure() {
+    let mut simulation = Simulation::start(true, true);
+    let log = simulation.folder.path().join("run.mcap");
+    let (child, said) = driving(&simulation, "following", log.to_str().unwrap());
+    // Both devices are gone at once, as when a power strip is switched off.
+    simulation.child.kill().unwrap();
+    std::thread::sleep(Duration::from_millis(300));
+    interrupt(&child);
+    let (code, stderr) = ended(child);
+    let said = said.join().unwrap();
+    assert_eq!(code, Some(1), "{said} {stderr}");
+    assert!(stderr.contains("not confirmed"), "{stderr}");
+    assert!(!said.contains("is held"), "{said}");
+}
+
+#[test]
+fn ctrl_c_during_activation_does_not_claim_a_hold() {
+    let mut simulation = Simulation::start(true, true);
+    let log = simulation.folder.path().join("run.mcap");
+    let (child, said) = driving(&simulation, "activating the gripper", log.to_str().unwrap());
+    interrupt(&child);
+    let (code, stderr) = ended(child);
+    let said = said.join().unwrap();
+    assert_eq!(code, Some(1), "{said} {stderr}");
+    assert!(stderr.contains("activating and cannot be held"), "{stderr}");
+    assert!(!said.contains("is held"), "{said}");
+    assert_eq!(simulation.end(), Some(0));
+}
+
+#[test]
+fn ctrl_c_while_a_silent_port_is_asked_is_no_fault_of_the_gripper() {
+    let (_master, port) = silent_port();
+    let arguments = teleop("/dev/null", &port, &[]);
+    let child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_millis(700));
+    interrupt(&child);
+    let error = refusal(&finish(child), 1);
+    assert!(error.contains("interrupted"), "{error}");
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod support;
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
-use support::{command, finish, json, model, poses_file, refusal, run, signal};
+use support::{command, finish, interrupt, json, model, poses_file, refusal, run};
 
 #[test]
 fn the_same_seed_trains_the_same_model_and_another_seed_another() {
@@ -80,7 +80,7 @@ fn ctrl_c_ends_a_training_soon_and_leaves_no_model() {
     .spawn()
     .unwrap();
     std::thread::sleep(Duration::from_millis(800));
-    signal(&child, "INT");
+    interrupt(&child);
     let asked = Instant::now();
     let output = finish(child);
     assert!(refusal(&output, 1).contains("interrupted"));

@@ -65,7 +65,10 @@ fn a_word_among_the_numbers_is_named_by_row_and_column() {
 #[test]
 fn too_few_rows_are_counted() {
     let error = train_refusal(&poses_text(12));
-    assert!(error.contains("12"), "{error}");
+    assert!(error.contains("12 rows") && error.contains("50"), "{error}");
+    let header = poses_text(0);
+    let error = train_refusal(&header);
+    assert!(error.contains("0 rows") && error.contains("50"), "{error}");
     train_refusal("");
 }
 
@@ -93,6 +96,39 @@ fn a_model_that_cannot_be_written_is_refused_before_training() {
         "/nowhere/m.safetensors",
     ]);
     assert!(refusal(&output, 2).contains("/nowhere/m.safetensors"));
+}
+
+#[test]
+fn a_recording_is_not_written_over_by_its_model() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let before = std::fs::read(&poses).unwrap();
+    for arguments in [
+        ["train", "--poses", path(&poses), "--out", path(&poses)],
+        ["demo", "--poses", path(&poses), "--log", path(&poses)],
+    ] {
+        assert!(refusal(&run(&arguments), 2).contains("poses.csv"));
+        assert_eq!(std::fs::read(&poses).unwrap(), before);
+    }
+    let other = folder.path().join("thesis.txt");
+    std::fs::write(&other, "three years of work").unwrap();
+    let output = run(&["train", "--poses", path(&poses), "--out", path(&other)]);
+    assert!(refusal(&output, 2).contains("not a safetensors file"));
+}
+
+#[test]
+fn a_result_that_the_disk_does_not_take_is_a_failure() {
+    let full = std::fs::OpenOptions::new()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let child = support::command(&["ports", "--json"])
+        .stdout(full)
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    let output = child.wait_with_output().unwrap();
+    assert!(refusal(&output, 1).contains("standard output"));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! `gauntlet demo`: the whole path, from a moving hand to a moving gripper, with nothing but this machine.
 
+use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -11,21 +12,22 @@ use rig::pty::{Handle, PtyDevice};
 use serde_json::json;
 use trainer::algorithm::Schedule;
 
-use super::{on_chip, teleop};
+use super::teleop;
 use crate::cli::Demo;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
+use crate::outputs::Kind;
 use crate::platform::Clock;
 use crate::port::BAUD;
 use crate::poses::Motion;
 use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
-use crate::run::{End, Options, Run, Summary};
+use crate::run::{End, Finished, Options, Run};
 use crate::session::{Parts, Session};
-use crate::session_log::{SessionLog, Written};
+use crate::session_log::SessionLog;
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Outcome, Request, train};
-use crate::{model, out, probe};
+use crate::{model, out, outputs, probe};
 
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
@@ -37,12 +39,13 @@ const FRAME_WAIT: Duration = Duration::from_secs(15);
 /// # Errors
 /// A failure that says which of its steps did not succeed.
 pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
-    if options.on_chip {
-        return on_chip::run(options, interrupt);
-    }
     let clock = Clock::start();
     let tell = Tell::new(options.json);
     let motion = Motion::open_for_training(options.poses.as_deref(), options.seed)?;
+    if let Some(path) = &options.log {
+        let inputs: Vec<_> = options.poses.iter().map(PathBuf::as_path).collect();
+        outputs::check(path, Kind::Log, &inputs)?;
+    }
     let log = options
         .log
         .as_deref()
@@ -62,29 +65,25 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     ));
     let mut run = Run::new(session, log, clock, interrupt.clone());
     let driven = drive(options, &mut run, &tell, interrupt);
-    let (summary, log) = run.finish()?;
+    let finished = run.finish()?;
     drop(devices);
     let end = driven?;
-    let finished = Finished {
+    let left = finished.stopped.judge();
+    let told = Told {
         outcome: &outcome,
-        summary: &summary,
-        log: log.as_ref(),
-        first_motion: summary.first_motion.map(Instant::from_ticks),
+        first_motion: finished.summary.first_motion.map(Instant::from_ticks),
+        finished: &finished,
         motion: &motion,
     };
-    finished.tell(options, &tell)?;
+    told.tell(options, &tell)?;
+    left?;
     match end {
-        End::Time => finished.judge(),
+        End::Time => told.judge(),
         End::Asked => Ok(()),
     }
 }
 
-pub(super) fn trained(
-    options: &Demo,
-    motion: &Motion,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<Outcome> {
+fn trained(options: &Demo, motion: &Motion, tell: &Tell, interrupt: &Interrupt) -> Result<Outcome> {
     let request = Request {
         motion,
         schedule: Schedule::Fast,
@@ -131,7 +130,10 @@ fn devices(
     tell: &Tell,
     interrupt: &Interrupt,
 ) -> Result<([Handle; 2], Parts)> {
-    let [glove, gripper] = virtual_devices(motion)?;
+    let glove = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
+    let glove = spawn("glove", Box::new(glove))?;
+    let gripper = VirtualGripper::new(rig::gripper::Config::default());
+    let gripper = spawn("gripper", Box::new(gripper))?;
     tell.say(format_args!(
         "devices    virtual glove on {}, virtual gripper on {}, {BAUD} baud",
         glove.path().display(),
@@ -145,15 +147,6 @@ fn devices(
         config: bridge::Config::default(),
     };
     Ok(([glove, gripper], parts))
-}
-
-/// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
-pub(super) fn virtual_devices(motion: &Motion) -> Result<[Handle; 2]> {
-    let glove = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
-    let glove = spawn("glove", Box::new(glove))?;
-    let gripper = VirtualGripper::new(rig::gripper::Config::default());
-    let gripper = spawn("gripper", Box::new(gripper))?;
-    Ok([glove, gripper])
 }
 
 fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
@@ -195,15 +188,14 @@ fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> R
 }
 
 /// All there is to say at the end.
-struct Finished<'a> {
+struct Told<'a> {
     outcome: &'a Outcome,
-    summary: &'a Summary,
-    log: Option<&'a Written>,
+    finished: &'a Finished,
     first_motion: Option<Instant>,
     motion: &'a Motion,
 }
 
-impl Finished<'_> {
+impl Told<'_> {
     fn tell(&self, options: &Demo, tell: &Tell) -> Result<()> {
         let first_motion = self.first_motion.map(|at| at.as_ticks() as f64 / 1e6);
         if options.json {
@@ -214,12 +206,16 @@ impl Finished<'_> {
                 "pairs": self.outcome.pairs,
                 "quality": self.outcome.quality,
                 "first_motion_s": first_motion,
-                "run": self.summary,
-                "log": self.log.map(|log| &log.path),
+                "gripper": self.finished.stopped,
+                "run": self.finished.summary,
+                "log": self.finished.log.as_ref().map(|log| &log.path),
             }));
         }
-        tell.say(format_args!("summary    the gripper is held where it is"));
-        for line in self.summary.lines() {
+        tell.say(format_args!(
+            "summary    {}",
+            self.finished.stopped.judge().unwrap_or("the run is over")
+        ));
+        for line in self.finished.summary.lines() {
             tell.say(format_args!("{line}"));
         }
         if let Some(first) = first_motion {
@@ -228,7 +224,7 @@ impl Finished<'_> {
             ));
         }
         tell.say(format_args!("map        {}", self.outcome.quality.line()));
-        tell.log(self.log);
+        tell.log(self.finished.log.as_ref());
         Ok(())
     }
 
@@ -242,5 +238,37 @@ impl Finished<'_> {
             "--log FILE.mcap, whose events say what held it",
         )
         .into())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quality(volume_occupancy: f64, d_knn: f64) -> Quality {
+        Quality {
+            mean_distortion: 6.0,
+            volume_occupancy,
+            d_knn,
+            frames: 254,
+            measured_on: "held-out frames".to_owned(),
+        }
+    }
+
+    #[test]
+    fn a_map_below_the_gate_is_refused_with_both_measures() {
+        assert!(require_good(&quality(0.90, 16.0)).is_ok());
+        for (occupancy, d_knn) in [
+            (0.899, 5.0),
+            (0.99, 16.01),
+            (f64::NAN, 5.0),
+            (0.99, f64::NAN),
+        ] {
+            let error = require_good(&quality(occupancy, d_knn)).unwrap_err();
+            assert!(
+                error.to_string().contains(&format!("{d_knn:.2}")),
+                "{error}"
+            );
+        }
     }
 }

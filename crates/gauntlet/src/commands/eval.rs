@@ -5,7 +5,7 @@ use serde_json::json;
 
 use crate::cli::Eval;
 use crate::poses::Motion;
-use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality, require_poses, targets};
+use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality, measuring_targets};
 use crate::{model, out, say};
 
 /// Measures.
@@ -14,11 +14,14 @@ use crate::{model, out, say};
 /// A failure that names the file and what is wrong with it.
 pub(super) fn run(options: &Eval) -> Result<()> {
     let model = model::load(&options.model)?;
-    let motion = Motion::open(Some(&options.poses), options.seed)?;
-    let frames = motion.frames();
-    require_poses(&options.poses, &frames)?;
+    let frames = Motion::open_for_measuring(&options.poses)?.frames();
     let measured_on = format!("frames of {}", options.poses.display());
-    let quality = Quality::of(&model, &frames, &targets(options.seed), measured_on);
+    let quality = Quality::of(
+        &model,
+        &frames,
+        &measuring_targets(options.seed),
+        measured_on,
+    );
     if options.json {
         return out::json(&json!({
             "model": options.model,

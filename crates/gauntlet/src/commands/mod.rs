@@ -1,12 +1,9 @@
 //! The verbs, one module each.
 
-mod bridge;
 mod demo;
 pub mod doctor;
 mod eval;
-mod flash;
 pub mod gripper;
-mod on_chip;
 mod ports;
 mod simulate;
 mod teleop;
@@ -23,20 +20,21 @@ use crate::interrupt::Interrupt;
 /// # Errors
 /// Whatever went wrong, mostly a [`crate::failure::Failure`] with the next step.
 pub fn run(cli: Cli) -> Result<()> {
-    let interrupt = Interrupt::install().or_fail(
-        || "Ctrl-C cannot be caught".to_owned(),
-        "ending other programs: the system lacks descriptors",
-    )?;
+    // Only where something must be brought to an end in order: elsewhere Ctrl-C ends the program as it ends any other.
+    let interrupt = || {
+        Interrupt::install().or_fail(
+            || "Ctrl-C cannot be caught".to_owned(),
+            "ending other programs: the system lacks descriptors",
+        )
+    };
     match cli.verb.unwrap_or_else(|| Verb::Demo(Demo::default())) {
-        Verb::Demo(options) => demo::run(&options, &interrupt),
-        Verb::Train(options) => train::run(&options, &interrupt),
+        Verb::Demo(options) => demo::run(&options, &interrupt()?),
+        Verb::Train(options) => train::run(&options, &interrupt()?),
         Verb::Eval(options) => eval::run(&options),
-        Verb::Simulate(options) => simulate::run(&options, &interrupt),
-        Verb::Teleop(options) => teleop::run(&options, &interrupt),
-        Verb::Flash(options) => flash::run(&options, &interrupt),
-        Verb::Bridge(options) => bridge::run(&options, &interrupt),
+        Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
+        Verb::Teleop(options) => teleop::run(&options, &interrupt()?),
         Verb::Ports(options) => ports::run(&options),
-        Verb::Gripper(options) => gripper::run(&options, &interrupt),
-        Verb::Doctor(options) => doctor::run(&options, &interrupt),
+        Verb::Gripper(options) => gripper::run(&options, &interrupt()?),
+        Verb::Doctor(options) => doctor::run(&options, &interrupt()?),
     }
 }

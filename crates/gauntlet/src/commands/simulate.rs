@@ -10,7 +10,7 @@ use rig::gripper::VirtualGripper;
 use rig::pty::{Handle, PtyDevice};
 
 use crate::cli::Simulate;
-use crate::failure::OrFail;
+use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::port::BAUD;
 use crate::poses::Motion;
@@ -68,8 +68,13 @@ pub(super) fn gripper(link: &Path) -> Result<Handle> {
 }
 
 fn spawn(device: Box<dyn Device>, link: &Path) -> Result<Handle> {
-    PtyDevice::spawn(device, Some(link)).or_fail(
-        || format!("no virtual device can be linked at {}", link.display()),
-        "a path that does not exist yet, in a folder that you may write to",
-    )
+    PtyDevice::spawn(device, Some(link)).map_err(|error| {
+        // The rig's texts end with the next step after their last colon.
+        let text = error.to_string();
+        let (what, next) = text.rsplit_once(": ").unwrap_or((
+            &text,
+            "a path that does not exist yet, in a folder that you may write to",
+        ));
+        Failure::new(format!("no virtual device there: {what}"), next).into()
+    })
 }

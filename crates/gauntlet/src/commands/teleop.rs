@@ -10,6 +10,7 @@ use serde_json::json;
 use crate::cli::{Hand, Teleop};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::outputs::Kind;
 use crate::platform::Clock;
 use crate::port::BAUD;
 use crate::record::AXES;
@@ -17,7 +18,7 @@ use crate::run::{Options, Run};
 use crate::session::{Order, Parts, Session};
 use crate::session_log::SessionLog;
 use crate::tell::Tell;
-use crate::{model, out, ports, probe, words};
+use crate::{model, out, outputs, ports, probe, words};
 
 /// Bring-up of 16 sensors: a reset of 650 ms, two mode changes each, and time to spare.
 const FRAME_WAIT: Duration = Duration::from_secs(15);
@@ -33,6 +34,9 @@ const CALIBRATION_WAIT: Duration = Duration::from_secs(3);
 pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_ports(options)?;
+    if let Some(path) = &options.log {
+        outputs::check(path, Kind::Log, &[&options.model])?;
+    }
     let image = model::image(&model::load(&options.model)?)?;
     let config = config(options.hand)?;
     for path in [&options.glove, &options.gripper] {
@@ -73,18 +77,26 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         }
         Ok(())
     });
-    let (summary, log) = run.finish()?;
+    let finished = run.finish()?;
     result?;
-    tell.say(format_args!("the gripper is held where it is"));
-    if options.json {
-        return out::json(&json!({ "run": summary, "log": log.map(|log| log.path) }));
+    let left = finished.stopped.judge();
+    if let Ok(left) = &left {
+        tell.say(format_args!("{left}"));
     }
-    summary
-        .lines()
-        .iter()
-        .for_each(|line| tell.say(format_args!("{line}")));
-    tell.log(log.as_ref());
-    Ok(())
+    if options.json {
+        out::json(&json!({
+            "gripper": finished.stopped,
+            "run": finished.summary,
+            "log": finished.log.map(|log| log.path),
+        }))?;
+    } else {
+        let lines = finished.summary.lines();
+        lines
+            .iter()
+            .for_each(|line| tell.say(format_args!("{line}")));
+        tell.log(finished.log.as_ref());
+    }
+    left.map(|_| ())
 }
 
 fn check_ports(options: &Teleop) -> Result<()> {

@@ -4,13 +4,14 @@ use anyhow::Result;
 use serde_json::json;
 
 use crate::cli::{Schedule, Train};
-use crate::failure::{Failure, told};
+use crate::failure::told;
 use crate::interrupt::Interrupt;
-use crate::out;
+use crate::outputs::Kind;
 use crate::poses::Motion;
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Request, train};
+use crate::{out, outputs};
 
 /// Trains on a recording.
 ///
@@ -18,7 +19,8 @@ use crate::training::{Request, train};
 /// A failure that names the file and what is wrong with it.
 pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
-    check_folder(options)?;
+    // Before minutes of training, not after.
+    outputs::check(&options.out, Kind::Model, &[&options.poses])?;
     let motion = Motion::open_for_training(Some(&options.poses), options.seed)?;
     let request = Request {
         motion: &motion,
@@ -53,20 +55,4 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     tell.say(format_args!("quality    {}", outcome.quality.line()));
     tell.say(format_args!("model      {}", options.out.display()));
     Ok(())
-}
-
-/// Finds out before minutes of training, not after, that the model cannot be written.
-fn check_folder(options: &Train) -> Result<()> {
-    let folder = match options.out.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => std::path::Path::new("."),
-    };
-    if folder.is_dir() && !options.out.is_dir() {
-        return Ok(());
-    }
-    Err(Failure::usage(
-        format!("the model cannot be written to {}", options.out.display()),
-        "a file name in a folder that exists",
-    )
-    .into())
 }

@@ -4,7 +4,7 @@ use glove::hand::{JOINT_NAMES, SEGMENT_NAMES};
 use gripper::Status;
 use serde_json::{Map, Value, json};
 
-use crate::record::{AXES, Command, Frame, Record, Sort};
+use crate::record::{AXES, AXIS_NAMES, Command, Frame, Record, Sort};
 use crate::words;
 
 /// Index into [`CHANNELS`].
@@ -61,8 +61,6 @@ pub(super) const CHANNELS: [Description; 6] = [
 
 /// Robotiq's letters of the axes, in the order of the positions.
 const LETTERS: [char; AXES] = ['A', 'B', 'C', 'S'];
-/// The axes' names in files.
-const AXIS_NAMES: [&str; AXES] = ["finger_a", "finger_b", "finger_c", "scissor"];
 
 /// The messages of one record.
 pub(super) fn messages(record: &Record) -> Vec<(Channel, Value)> {

@@ -7,6 +7,8 @@ use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
+use rustix::process::{Pid, Signal, kill_process};
+
 /// No command of these tests may take longer, on a busy machine too.
 const DEADLINE: Duration = Duration::from_secs(300);
 
@@ -60,13 +62,10 @@ pub fn wait(child: &mut Child) -> std::process::ExitStatus {
     }
 }
 
-/// A signal by its name, as `kill` takes it.
-pub fn signal(child: &Child, name: &str) {
-    let done = Command::new("kill")
-        .args(["-s", name, &child.id().to_string()])
-        .status()
-        .unwrap();
-    assert!(done.success());
+/// What Ctrl-C sends.
+pub fn interrupt(child: &Child) {
+    let id = Pid::from_raw(i32::try_from(child.id()).unwrap()).unwrap();
+    kill_process(id, Signal::INT).unwrap();
 }
 
 pub fn text(bytes: &[u8]) -> String {
@@ -139,6 +138,20 @@ pub fn model() -> &'static Path {
         .1
 }
 
+/// Reads lines until one contains `word`; the rest is read by a thread, so that the child never waits for its reader.
+pub fn until_line(stdout: ChildStdout, word: &str) -> std::thread::JoinHandle<String> {
+    let mut reader = BufReader::new(stdout);
+    let mut said = String::new();
+    while !said.contains(word) {
+        let read = reader.read_line(&mut said).unwrap();
+        assert!(read > 0, "ended before it said {word}: {said}");
+    }
+    std::thread::spawn(move || {
+        reader.read_to_string(&mut said).unwrap();
+        said
+    })
+}
+
 /// A running `simulate`, ended with the test.
 pub struct Simulation {
     pub folder: tempfile::TempDir,
@@ -185,7 +198,7 @@ impl Simulation {
 
     /// Ends it in order; returns its exit code.
     pub fn end(&mut self) -> Option<i32> {
-        signal(&self.child, "INT");
+        interrupt(&self.child);
         wait(&mut self.child).code()
     }
 }
