@@ -11,12 +11,16 @@
 //! | [`platform`], [`slots`], [`session`] | the bridge on a PC: clock and wait, weights, thread and queues |
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
+//! | [`host_link`], [`chip`], [`emulator`] | a bridge on a chip: the host protocol, watching it, the firmware in QEMU |
 //! | [`poses`], [`training`], [`quality`], [`model`] | hand motion, the map and its measures |
 
+pub mod chip;
 pub mod cli;
 pub mod commands;
 pub mod diagnose;
+pub mod emulator;
 pub mod failure;
+pub mod host_link;
 pub mod interrupt;
 pub mod line;
 pub mod live;

@@ -12,7 +12,7 @@ use rig::pty::{Handle, PtyDevice};
 use serde_json::json;
 use trainer::algorithm::Schedule;
 
-use super::teleop;
+use super::{on_chip, teleop};
 use crate::cli::Demo;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
@@ -39,6 +39,9 @@ const FRAME_WAIT: Duration = Duration::from_secs(15);
 /// # Errors
 /// A failure that says which of its steps did not succeed.
 pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
+    if options.on_chip {
+        return on_chip::run(options, interrupt);
+    }
     let clock = Clock::start();
     let tell = Tell::new(options.json);
     let motion = Motion::open_for_training(options.poses.as_deref(), options.seed)?;
@@ -83,7 +86,12 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     }
 }
 
-fn trained(options: &Demo, motion: &Motion, tell: &Tell, interrupt: &Interrupt) -> Result<Outcome> {
+pub(super) fn trained(
+    options: &Demo,
+    motion: &Motion,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<Outcome> {
     let request = Request {
         motion,
         schedule: Schedule::Fast,
@@ -130,10 +138,7 @@ fn devices(
     tell: &Tell,
     interrupt: &Interrupt,
 ) -> Result<([Handle; 2], Parts)> {
-    let glove = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
-    let glove = spawn("glove", Box::new(glove))?;
-    let gripper = VirtualGripper::new(rig::gripper::Config::default());
-    let gripper = spawn("gripper", Box::new(gripper))?;
+    let [glove, gripper] = virtual_devices(motion)?;
     tell.say(format_args!(
         "devices    virtual glove on {}, virtual gripper on {}, {BAUD} baud",
         glove.path().display(),
@@ -147,6 +152,15 @@ fn devices(
         config: bridge::Config::default(),
     };
     Ok(([glove, gripper], parts))
+}
+
+/// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
+pub(super) fn virtual_devices(motion: &Motion) -> Result<[Handle; 2]> {
+    let glove = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
+    let glove = spawn("glove", Box::new(glove))?;
+    let gripper = VirtualGripper::new(rig::gripper::Config::default());
+    let gripper = spawn("gripper", Box::new(gripper))?;
+    Ok([glove, gripper])
 }
 
 fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {

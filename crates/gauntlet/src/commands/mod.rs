@@ -1,9 +1,12 @@
 //! The verbs, one module each.
 
+mod bridge;
 mod demo;
 pub mod doctor;
 mod eval;
+mod flash;
 pub mod gripper;
+mod on_chip;
 mod ports;
 mod simulate;
 mod teleop;
@@ -33,6 +36,8 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Eval(options) => eval::run(&options),
         Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
         Verb::Teleop(options) => teleop::run(&options, &interrupt()?),
+        Verb::Flash(options) => flash::run(&options, &interrupt()?),
+        Verb::Bridge(options) => bridge::run(&options, &interrupt()?),
         Verb::Ports(options) => ports::run(&options),
         Verb::Gripper(options) => gripper::run(&options, &interrupt()?),
         Verb::Doctor(options) => doctor::run(&options, &interrupt()?),
