@@ -1,5 +1,7 @@
-//! Microseconds since the start, from SysTick: one interrupt a millisecond, and the counter's value in between
-//! (Armv7-M Architecture Reference Manual, B3.3).
+//! Microseconds since the start, from a CMSDK APB timer (Arm DDI 0479, chapter 4.1) that counts the bus clock down
+//! without end; SysTick only wakes the processor every millisecond.
+//!
+//! Ticks are not counted: an emulator that is kept waiting by its host merges interrupts, and time would run slow.
 
 use super::CLOCK_HZ;
 use bridge::Instant;
@@ -8,41 +10,39 @@ use cortex_m::peripheral::SYST;
 use cortex_m::peripheral::syst::SystClkSource;
 use critical_section::Mutex;
 
+const TIMER: usize = 0x4000_0000;
+const CONTROL: usize = 0x00;
+const VALUE: usize = 0x04;
+const RELOAD: usize = 0x08;
+const CONTROL_ENABLE: u32 = 1;
 const TICKS_PER_MILLISECOND: u32 = CLOCK_HZ / 1_000;
-const TICKS_PER_MICROSECOND: u32 = CLOCK_HZ / 1_000_000;
+const TICKS_PER_MICROSECOND: u64 = CLOCK_HZ as u64 / 1_000_000;
 
-static MILLISECONDS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
+/// Ticks since the start at the newest look. The timer wraps every 171 s and is looked at every millisecond.
+static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
 /// Monotonic time since [`SystemTime::start`].
 pub struct SystemTime {
-    systick: SYST,
+    _tick: SYST,
 }
 
 impl SystemTime {
-    /// Starts the tick.
+    /// Starts the timer and the tick.
     pub fn start(mut systick: SYST) -> Self {
+        write(RELOAD, u32::MAX);
+        write(VALUE, u32::MAX);
+        write(CONTROL, CONTROL_ENABLE);
         systick.set_clock_source(SystClkSource::Core);
         systick.set_reload(TICKS_PER_MILLISECOND - 1);
         systick.clear_current();
         systick.enable_counter();
         systick.enable_interrupt();
-        Self { systick }
+        Self { _tick: systick }
     }
 
     /// The time now, in microseconds.
     pub fn now(&mut self) -> Instant {
-        let microseconds = critical_section::with(|section| {
-            let before = SYST::get_current();
-            // With interrupts off a wrap shows as a pending tick that nobody has counted; the value is read again then,
-            // because the first may be from before the wrap.
-            let pending = cortex_m::peripheral::SCB::is_pendst_pending();
-            let current = if pending { SYST::get_current() } else { before };
-            let milliseconds = MILLISECONDS.borrow(section).get() + u64::from(pending);
-            let into = (TICKS_PER_MILLISECOND - 1).saturating_sub(current) / TICKS_PER_MICROSECOND;
-            milliseconds * 1_000 + u64::from(into)
-        });
-        let _ = &self.systick;
-        Instant::from_ticks(microseconds)
+        Instant::from_ticks(look() / TICKS_PER_MICROSECOND)
     }
 }
 
@@ -51,10 +51,31 @@ pub fn wait_for_interrupt() {
     cortex_m::asm::wfi();
 }
 
-/// Counts one millisecond; called by the SysTick exception only.
+/// Wakes the processor and sees every wrap of the timer; called by the SysTick exception only.
 pub(super) fn tick() {
+    look();
+}
+
+/// Ticks since the start.
+fn look() -> u64 {
     critical_section::with(|section| {
-        let milliseconds = MILLISECONDS.borrow(section);
-        milliseconds.set(milliseconds.get().wrapping_add(1));
-    });
+        let ticks = TICKS.borrow(section);
+        // The timer counts down from its greatest value.
+        let elapsed = u32::MAX - read(VALUE);
+        let since = elapsed.wrapping_sub(ticks.get() as u32);
+        let now = ticks.get().wrapping_add(u64::from(since));
+        ticks.set(now);
+        now
+    })
+}
+
+fn read(register: usize) -> u32 {
+    // SAFETY: the address is a register of the timer that this board has (Arm AN386, memory map); reading it has no
+    // effect on memory.
+    unsafe { core::ptr::read_volatile((TIMER + register) as *const u32) }
+}
+
+fn write(register: usize, value: u32) {
+    // SAFETY: as for `read`; the register is not memory that Rust owns.
+    unsafe { core::ptr::write_volatile((TIMER + register) as *mut u32, value) }
 }
