@@ -409,7 +409,7 @@ fn fingers(sample: &Sample) -> Vec<Finger> {
 }
 
 fn axes(sample: &Sample) -> Vec<Axis> {
-    words::AXIS_NAMES
+    words::AXIS_WORDS
         .iter()
         .enumerate()
         .map(|(axis, name)| Axis {

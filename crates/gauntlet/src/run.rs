@@ -16,7 +16,7 @@ use crate::failure::OrFail;
 use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
 use crate::platform::Clock;
-use crate::record::{AXES, AXIS_NAMES, Record, Sort};
+use crate::record::{AXES, Record, Sort};
 use crate::session::{Order, Session, Snapshot, Stopped};
 use crate::session_log::{SessionLog, Written};
 use crate::{out, words};
@@ -391,7 +391,7 @@ fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
 fn axes(snapshot: &Snapshot) -> Vec<Axis> {
     (0..AXES)
         .map(|axis| Axis {
-            name: AXIS_NAMES[axis],
+            name: words::AXIS_WORDS[axis],
             asked: snapshot.command.map(|motion| motion.position[axis]),
             reached: snapshot.status.map(|status| status.position[axis]),
             word: snapshot

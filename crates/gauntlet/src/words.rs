@@ -5,7 +5,8 @@ use glove::scan::Health;
 use gripper::{Activation, Contact, Status};
 
 use crate::record::AXES;
-pub use crate::record::AXIS_NAMES;
+/// The gripper's axes as a person reads them; files have [`crate::record::AXIS_NAMES`].
+pub const AXIS_WORDS: [&str; AXES] = ["finger A", "finger B", "finger C", "scissor"];
 
 /// The fingers, thumb first: each has five joint angles in a row.
 pub const FINGER_NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];

@@ -76,7 +76,7 @@ impl Bench<4> for ThreeFinger<Line> {
         });
     }
     fn names(&self) -> (&'static str, [&'static str; 4]) {
-        ("3-Finger gripper", crate::words::AXIS_NAMES)
+        ("3-Finger gripper", crate::words::AXIS_WORDS)
     }
     fn facts(&self) -> Vec<(&'static str, String)> {
         let Some(block) = self.raw_status() else {
