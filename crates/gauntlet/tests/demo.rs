@@ -9,10 +9,11 @@ use support::{json, run};
 fn the_demo_trains_and_moves_the_gripper() {
     let folder = tempfile::tempdir().unwrap();
     let log = folder.path().join("demo.mcap");
+    // Long enough that a machine whose processors are taken away for seconds still gets its motion in.
     let said = json(&run(&[
         "demo",
         "--seconds",
-        "3",
+        "12",
         "--json",
         "--log",
         log.to_str().unwrap(),
