@@ -6,7 +6,8 @@
 use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use heapless::Vec;
 
-const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+/// The CRC of frames and of whole images.
+pub(super) const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 const CRC_BYTES: usize = 4;
 /// Bytes of the longest message.
 pub const MAX_MESSAGE: usize = 640;

@@ -8,11 +8,9 @@ use super::message::{
 use crate::store::{Contents, WeightsStore};
 use crate::telemetry::bump;
 use crate::{App, Config, Duration, Instant, Platform, Settings, Slot, config};
-use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use embedded_io::{Read, ReadReady, Write};
 use gripper::Gripper;
 
-const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 /// A host that wrote or held the clutch and then said nothing for so long has lost its session.
 const LEASE: Duration = Duration::from_millis(2_000);
 /// Least time between telemetry samples: at 115200 baud one takes about 14 ms of the line.
@@ -561,7 +559,7 @@ fn slots<F: Slot>(store: &WeightsStore<F>) -> Slots {
                     model_id: image.checked.header().meta.model_id,
                     version: image.checked.header().meta.version,
                     length: length as u32,
-                    crc: CRC32.checksum(bytes),
+                    crc: frame::CRC32.checksum(bytes),
                 }
             }
         };
