@@ -80,7 +80,7 @@ pub struct Demo {
     #[arg(long, value_name = "FILE.mcap")]
     pub log: Option<PathBuf>,
     /// How long to drive the gripper, in seconds (1 to 86400).
-    #[arg(long, value_name = "N", default_value = "20", value_parser = run_time)]
+    #[arg(long, value_name = "N", default_value = "20", value_parser = run_time, allow_negative_numbers = true)]
     pub seconds: Duration,
     /// Seed of everything random: the same seed trains the same map.
     #[arg(long, value_name = "N", default_value_t = 1)]
@@ -243,7 +243,7 @@ pub struct Teleop {
     #[arg(long, value_name = "MODEL.safetensors")]
     pub model: PathBuf,
     /// End by itself after this many seconds (1 to 86400).
-    #[arg(long, value_name = "N", value_parser = run_time)]
+    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
     pub seconds: Option<Duration>,
     /// Close the clutch from the start: the gripper follows as soon as everything is ready.
     #[arg(long)]
@@ -323,7 +323,7 @@ pub enum BridgeVerb {
         #[arg(long)]
         activate: bool,
         /// End by itself after this many seconds (1 to 86400).
-        #[arg(long, value_name = "N", value_parser = run_time)]
+        #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
     },
     /// Watch hand and gripper; the clutch is not touched.
@@ -332,7 +332,7 @@ pub enum BridgeVerb {
         #[command(flatten)]
         at: BridgeAt,
         /// End by itself after this many seconds (1 to 86400).
-        #[arg(long, value_name = "N", value_parser = run_time)]
+        #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
     },
     /// Write the hand's joint angles, 20 a second, into a poses file that `train` takes.
@@ -344,7 +344,7 @@ pub enum BridgeVerb {
         #[arg(long, value_name = "FILE.csv")]
         out: PathBuf,
         /// End by itself after this many seconds (1 to 86400).
-        #[arg(long, value_name = "N", value_parser = run_time)]
+        #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
     },
     /// Make the image in a slot the active one.

@@ -8,7 +8,7 @@
 //! | [`port`], [`ports`], [`probe`] | serial ports: open, list, is anybody there |
 //! | [`mod@line`], [`tcp`] | a gripper's line: a serial port or Modbus TCP |
 //! | [`diagnose`] | which layer of a device fails |
-//! | [`platform`], [`slots`], [`session`] | the bridge on a PC: clock and wait, weights, thread and queues |
+//! | [`platform`], [`realtime`], [`slots`], [`session`] | the bridge on a PC: clock and wait, priority, weights, thread and queues |
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
 //! | [`host_link`], [`chip`], [`emulator`] | a bridge on a chip: the host protocol, watching it, the firmware in QEMU |
@@ -34,6 +34,7 @@ pub mod poses;
 pub mod probe;
 pub mod progress;
 pub mod quality;
+pub mod realtime;
 pub mod record;
 pub mod run;
 pub mod session;

@@ -182,8 +182,13 @@ impl Run {
         self.clutch = options.engage;
         let started = Instant::now();
         self.numbers.begin();
+        let mut last_round = started;
         loop {
             self.round()?;
+            let moving = self.session.snapshot().map(|s| s.state.is_moving());
+            self.numbers
+                .pass(last_round.elapsed(), self.clutch, moving == Some(true));
+            last_round = Instant::now();
             for key in live.keys().or_fail(terminal, next)? {
                 self.obey(key);
             }
@@ -219,7 +224,7 @@ impl Run {
             written
         });
         Ok(Finished {
-            summary: self.numbers.summary(counters),
+            summary: self.numbers.summary(counters, self.session.scheduling()),
             log,
             stopped,
         })

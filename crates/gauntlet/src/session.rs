@@ -23,6 +23,7 @@ use crate::interrupt::Interrupt;
 use crate::line::{Line, Settings};
 use crate::platform::{Clock, Pc};
 use crate::port::{BAUD, Port, Watch};
+use crate::realtime::{self, Scheduling};
 use crate::record::{AXES, Command, Frame, Imu, Record, Sort};
 use crate::slots::MemorySlot;
 
@@ -118,6 +119,7 @@ pub struct Session {
     snapshot: Arc<Mutex<Option<Snapshot>>>,
     lost: Arc<AtomicU64>,
     ports: [Watch; 2],
+    scheduling: Scheduling,
 }
 
 fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -150,9 +152,9 @@ impl Session {
             ending: None,
             activation_asked: false,
         };
-        let thread = std::thread::Builder::new()
-            .name("bridge".to_owned())
-            .spawn(move || {
+        let bridge = std::thread::Builder::new().name("bridge".to_owned());
+        let start = move || {
+            bridge.spawn(move || {
                 let scanner = Scanner::new(
                     parts.glove,
                     scan::Config {
@@ -165,10 +167,11 @@ impl Session {
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
                 worker.run(&mut app)
             })
-            .or_fail(
-                || "the bridge cannot start".to_owned(),
-                "ending other programs",
-            )?;
+        };
+        let refused = || "the bridge cannot start".to_owned();
+        let next = "ending other programs";
+        let (thread, scheduling) = realtime::starting(start).or_fail(refused, next)?;
+        let thread = thread.or_fail(refused, next)?;
         Ok(Self {
             thread: Some(thread),
             orders,
@@ -176,6 +179,7 @@ impl Session {
             snapshot,
             lost,
             ports,
+            scheduling,
         })
     }
 
@@ -202,6 +206,11 @@ impl Session {
     /// The glove's and the gripper's port.
     pub fn ports(&self) -> &[Watch; 2] {
         &self.ports
+    }
+
+    /// How the bridge's thread is scheduled.
+    pub fn scheduling(&self) -> Scheduling {
+        self.scheduling
     }
 
     /// Whether the bridge's thread still runs.

@@ -27,7 +27,7 @@ use crate::session_log::SessionLog;
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Outcome, Request, train};
-use crate::{model, out, outputs, probe};
+use crate::{model, out, outputs, probe, realtime};
 
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
@@ -164,10 +164,12 @@ pub(super) fn virtual_devices(motion: &Motion) -> Result<[Handle; 2]> {
 }
 
 fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
-    PtyDevice::spawn(device, None).or_fail(
-        || format!("the virtual {name} gets no pseudo-terminal"),
-        "ending programs that hold many of them (`ls /dev/pts`)",
-    )
+    realtime::starting(|| PtyDevice::spawn(device, None))
+        .and_then(|(handle, _)| handle)
+        .or_fail(
+            || format!("the virtual {name} gets no pseudo-terminal"),
+            "ending programs that hold many of them (`ls /dev/pts`)",
+        )
 }
 
 /// Brings everything up, activates, engages, runs.

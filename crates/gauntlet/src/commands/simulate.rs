@@ -14,7 +14,7 @@ use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::port::BAUD;
 use crate::poses::Motion;
-use crate::{probe, say};
+use crate::{probe, realtime, say};
 
 /// How often the wait for Ctrl-C looks around.
 const WATCH: Duration = Duration::from_secs(3600);
@@ -68,7 +68,8 @@ pub(super) fn gripper(link: &Path) -> Result<Handle> {
 }
 
 fn spawn(device: Box<dyn Device>, link: &Path) -> Result<Handle> {
-    PtyDevice::spawn(device, Some(link)).map_err(|error| {
+    let spawned = realtime::starting(|| PtyDevice::spawn(device, Some(link)));
+    spawned.and_then(|(handle, _)| handle).map_err(|error| {
         // The rig's texts end with the next step after their last colon.
         let text = error.to_string();
         let (what, next) = text.rsplit_once(": ").unwrap_or((

@@ -1,13 +1,20 @@
 //! What is counted during a run, and its sum.
 
+use std::time::Duration;
+
 use gripper::Instant;
 use serde::Serialize;
 
+use crate::realtime::Scheduling;
 use crate::record::{AXES, Record, Sort};
-use crate::stats::{Percentiles, Rate, short_or_dash};
+use crate::stats::{Percentiles, Rate, seconds, short_or_dash};
 
 /// Counts an axis must have gone before that is called a motion: more than noise of the measured position.
 const MOVED_COUNTS: u8 = 4;
+/// One late step in so many is more than a computer with time for the bridge shows.
+const LATE_ONE_IN: u64 = 50;
+/// A step this late, µs, costs a glove that is not to blame two exchanges.
+const VERY_LATE_US: u32 = 20_000;
 
 /// Counters of a run, in bounded memory.
 #[derive(Debug, Default)]
@@ -27,6 +34,9 @@ pub struct Numbers {
     last_sequence: Option<u32>,
     faults: u64,
     following: bool,
+    /// Time with the clutch closed since it first followed, moving and held.
+    moving: Duration,
+    held: Duration,
     /// Positions when following began.
     start_positions: Option<[u8; AXES]>,
     first_motion: Option<Instant>,
@@ -77,6 +87,16 @@ impl Numbers {
         }
     }
 
+    /// `time` passed, in which the clutch was closed or not, and the gripper followed or not.
+    pub fn pass(&mut self, time: Duration, clutch: bool, moving: bool) {
+        match (clutch, moving) {
+            (true, true) => self.moving += time,
+            // What comes before it first follows is bringing up, not holding.
+            (true, false) if !self.moving.is_zero() => self.held += time,
+            _ => {}
+        }
+    }
+
     fn look_for_motion(&mut self, at: Instant, position: [u8; AXES]) {
         if !self.following || self.first_motion.is_some() {
             return;
@@ -107,7 +127,11 @@ impl Numbers {
     }
 
     /// The sum of the run.
-    pub fn summary(&self, counters: Option<bridge::telemetry::Counters>) -> Summary {
+    pub fn summary(
+        &self,
+        counters: Option<bridge::telemetry::Counters>,
+        scheduling: Scheduling,
+    ) -> Summary {
         Summary {
             glove_frames: self.frames.count(),
             glove_frames_per_s: rounded(self.frames.mean()),
@@ -126,6 +150,9 @@ impl Numbers {
             worst_late_us: counters.map_or(0, |c| c.worst_late_us),
             gripper_errors: counters.map_or(0, |c| c.gripper_errors),
             holds: counters.map_or(0, |c| c.holds),
+            moving_s: rounded(self.moving.as_secs_f64()),
+            held_s: rounded(self.held.as_secs_f64()),
+            scheduling,
             first_motion: self.first_motion.map(|at| at.as_ticks()),
         }
     }
@@ -172,6 +199,12 @@ pub struct Summary {
     pub gripper_errors: u32,
     /// How often motion was held.
     pub holds: u32,
+    /// Time in which the gripper followed the hand, s.
+    pub moving_s: f64,
+    /// Time in which it was held although the clutch was closed, after it had first followed, s.
+    pub held_s: f64,
+    /// How the bridge's thread was scheduled.
+    pub scheduling: Scheduling,
     /// When the gripper first moved with the hand, µs since the tool started.
     #[serde(skip)]
     pub first_motion: Option<u64>,
@@ -189,7 +222,7 @@ impl Summary {
                 self.gripper_cycles
             ),
             format!(
-                "answered   {} of {} glove frames got a gripper command; dropped frames {}",
+                "answered   {} of {} glove frames that came while following got a gripper command; dropped frames {}",
                 self.frames_answered, self.frames_following, self.frames_dropped
             ),
             format!(
@@ -210,9 +243,31 @@ impl Summary {
             ),
         ];
         if self.holds > 0 {
-            lines.push(format!("holds      motion was held {} times", self.holds));
+            lines.push(format!(
+                "holds      motion was held {} times, {} in all; it followed for {}",
+                self.holds,
+                seconds(Duration::from_secs_f64(self.held_s)),
+                seconds(Duration::from_secs_f64(self.moving_s))
+            ));
+        }
+        if self.too_busy() {
+            lines.push(format!(
+                "computer   too busy for an even motion: {} of {} steps came late, not the devices; close other programs{}",
+                self.late_steps,
+                self.commands,
+                match self.scheduling {
+                    Scheduling::Realtime => "",
+                    Scheduling::Shared => ", or allow real-time priority (docs/tool.md)",
+                }
+            ));
         }
         lines
+    }
+
+    /// Whether the bridge's own steps came so late that samples and replies grew old in this computer.
+    fn too_busy(&self) -> bool {
+        u64::from(self.late_steps) * LATE_ONE_IN > self.commands
+            || self.worst_late_us >= VERY_LATE_US
     }
 }
 
@@ -281,7 +336,7 @@ mod tests {
         numbers.count(&frame(160_000, 3, true));
         numbers.count(&command(true));
         assert_eq!(numbers.dropped(), 2);
-        let summary = numbers.summary(None);
+        let summary = numbers.summary(None, Scheduling::Shared);
         assert_eq!((summary.frames_following, summary.frames_answered), (3, 2));
     }
 
@@ -297,6 +352,42 @@ mod tests {
         assert_eq!(numbers.first_motion(), None);
         numbers.count(&status(6, 104));
         assert_eq!(numbers.first_motion(), Some(at(6)));
+    }
+
+    #[test]
+    fn time_held_counts_from_the_first_following_and_with_the_clutch_closed() {
+        let mut numbers = Numbers::default();
+        let second = Duration::from_secs(1);
+        for (clutch, moving) in [
+            (true, false),
+            (true, true),
+            (true, false),
+            (false, false),
+            (true, true),
+        ] {
+            numbers.pass(second, clutch, moving);
+        }
+        let summary = numbers.summary(None, Scheduling::Shared);
+        assert_eq!((summary.moving_s, summary.held_s), (2.0, 1.0));
+    }
+
+    #[test]
+    fn late_steps_blame_the_computer() {
+        let blamed = |late_steps, worst_late_us| {
+            let counters = bridge::telemetry::Counters {
+                late_steps,
+                worst_late_us,
+                holds: 1,
+                ..Default::default()
+            };
+            let mut numbers = Numbers::default();
+            (0..1000).for_each(|_| numbers.count(&command(true)));
+            let summary = numbers.summary(Some(counters), Scheduling::Shared);
+            summary.lines().iter().any(|line| line.contains("too busy"))
+        };
+        assert!(!blamed(20, 3_000));
+        assert!(blamed(21, 3_000));
+        assert!(blamed(1, 20_000));
     }
 
     #[test]
