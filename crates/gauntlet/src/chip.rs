@@ -233,6 +233,7 @@ impl<'a> Watch<'a> {
             return Err(Failure::from(Error::Silent {
                 address: self.link.address().clone(),
                 attempts: self.missed,
+                heard: self.link.heard(),
             })
             .into());
         }

@@ -1,5 +1,7 @@
 //! What goes wrong between host and bridge, in a person's words with the next step.
 
+use std::fmt;
+
 use bridge::protocol::message::{Refusal, SETTING_NAMES, VERSION};
 
 use super::Address;
@@ -24,12 +26,14 @@ pub enum Error {
     #[error("the line to the bridge broke")]
     Lost,
     /// No reply came, however often it was asked.
-    #[error("no bridge answers on {address} ({attempts} requests sent)")]
+    #[error("no bridge answers on {address} ({attempts} requests sent; {heard})")]
     Silent {
         /// Where.
         address: Address,
         /// Requests sent.
         attempts: u32,
+        /// What came instead of a reply.
+        heard: Heard,
     },
     /// The bridge's own word.
     #[error("the bridge refuses: {}", refusal_words(.0).0)]
@@ -60,6 +64,49 @@ pub enum Error {
     },
 }
 
+/// What came over the line while a reply was waited for.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// Bytes.
+    pub bytes: u32,
+    /// Frames that were damaged: a wrong CRC, no COBS, or too long.
+    pub damaged: u32,
+    /// Whole frames whose message this tool does not know.
+    pub unknown: u32,
+    /// Replies to other requests.
+    pub foreign: u32,
+    /// Telemetry samples.
+    pub samples: u32,
+}
+
+impl fmt::Display for Heard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.bytes == 0 {
+            return f.write_str("not a byte came back");
+        }
+        write!(f, "{} bytes came back", self.bytes)?;
+        for (count, what) in [
+            (self.damaged, "damaged frames"),
+            (
+                self.unknown,
+                "whole frames with a message this tool does not know",
+            ),
+            (self.foreign, "replies to other requests"),
+            (self.samples, "telemetry samples"),
+        ] {
+            if count > 0 {
+                write!(f, ", {count} {what}")?;
+            }
+        }
+        let named = self.damaged + self.unknown + self.foreign + self.samples;
+        f.write_str(if named == 0 {
+            ", no frame among them"
+        } else {
+            ""
+        })
+    }
+}
+
 impl Error {
     /// Whether opening the line again may help.
     pub fn is_of_the_line(&self) -> bool {
@@ -80,8 +127,14 @@ impl From<Error> for Failure {
             Error::Open(error) => return error.clone().into(),
             Error::Connect { .. } => "starting the emulator first, and its socket's path".to_owned(),
             Error::Lost => "the cable, and the bridge's power; then the same command again".to_owned(),
+            Error::Silent { heard, .. } if heard.unknown > 0 => {
+                "the tool and the firmware of the same release".to_owned()
+            }
+            Error::Silent { heard, .. } if heard.bytes > 0 => {
+                "that this is UART 0 of a bridge, 115200 baud at both ends, and that no other program speaks on this line".to_owned()
+            }
             Error::Silent { .. } => {
-                "the bridge's power, its UART 0 at 115200 baud, and that no other program speaks on this line".to_owned()
+                "the bridge's power, and that this is its UART 0".to_owned()
             }
             Error::Refused(refusal) => refusal_words(refusal).1,
             Error::Confused(_) => "the same command again; the tool and the firmware of the same release".to_owned(),

@@ -7,6 +7,8 @@
 mod error;
 mod flash;
 mod line;
+#[cfg(test)]
+mod tests;
 
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
@@ -17,7 +19,7 @@ use bridge::protocol::message::{
     VERSION,
 };
 
-pub use error::{Error, refusal_words};
+pub use error::{Error, Heard, refusal_words};
 pub use flash::Flashed;
 pub use line::Address;
 use line::Line;
@@ -47,6 +49,8 @@ pub struct HostLink {
     hello: Option<Hello>,
     samples: VecDeque<Sample>,
     repeats: u32,
+    /// Since the newest request was first sent.
+    heard: Heard,
 }
 
 impl HostLink {
@@ -64,6 +68,7 @@ impl HostLink {
             hello: None,
             samples: VecDeque::new(),
             repeats: 0,
+            heard: Heard::default(),
         };
         link.reconnect()?;
         Ok(link)
@@ -114,6 +119,11 @@ impl HostLink {
         self.repeats
     }
 
+    /// What came back, beside its reply, since the newest request was sent.
+    pub fn heard(&self) -> Heard {
+        self.heard
+    }
+
     /// Asks, and waits for the answer.
     ///
     /// # Errors
@@ -137,6 +147,8 @@ impl HostLink {
             call: call.clone(),
         };
         let bytes = framed(&request)?;
+        self.heard = Heard::default();
+        let damaged_before = self.damaged();
         for attempt in 0..attempts {
             self.repeats += u32::from(attempt > 0);
             let deadline = Instant::now() + wait;
@@ -145,12 +157,21 @@ impl HostLink {
                 if reply.session == self.session && reply.sequence == self.sequence {
                     return reply.answer.map_err(Error::Refused);
                 }
+                self.heard.foreign += 1;
             }
         }
+        self.heard.damaged = self.damaged().wrapping_sub(damaged_before);
         Err(Error::Silent {
             address: self.address.clone(),
             attempts,
+            heard: self.heard,
         })
+    }
+
+    /// Damaged frames since the line was opened.
+    fn damaged(&self) -> u32 {
+        let counters = self.decoder.counters();
+        counters.crc + counters.coding + counters.oversized
     }
 
     fn send(&mut self, bytes: &[u8], deadline: Instant) -> Result<(), Error> {
@@ -170,21 +191,23 @@ impl HostLink {
             let line = self.line.as_mut().ok_or(Error::Lost)?;
             match line.read(&mut byte, deadline) {
                 Ok(0) => return Ok(None),
-                Ok(_) => {}
+                Ok(_) => self.heard.bytes = self.heard.bytes.saturating_add(1),
                 Err(_) => return Err(self.lose()),
             }
             let message = self
                 .decoder
                 .push(byte[0], |message| postcard::from_bytes(message).ok());
-            match message.flatten() {
-                Some(FromBridge::Reply(reply)) => return Ok(Some(reply)),
-                Some(FromBridge::Sample(sample)) => {
+            match message {
+                None => {}
+                Some(None) => self.heard.unknown += 1,
+                Some(Some(FromBridge::Reply(reply))) => return Ok(Some(reply)),
+                Some(Some(FromBridge::Sample(sample))) => {
+                    self.heard.samples += 1;
                     if self.samples.len() == SAMPLES {
                         self.samples.pop_front();
                     }
                     self.samples.push_back(sample);
                 }
-                None => {}
             }
         }
     }

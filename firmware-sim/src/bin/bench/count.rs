@@ -1,0 +1,269 @@
+//! Instructions, counted with SysTick: under `-icount shift=6` an instruction takes 64 ns of the machine's time, 1.6 ticks
+//! at 25 MHz. Whatever is counted here is counted in one trace and in the same way each time.
+
+use super::flash;
+use super::memory::Memory;
+use super::replay::{AXES, Machine, Replay, Tape, scanner};
+use bridge::gripper::driver::ThreeFinger;
+use bridge::gripper::link::Counters;
+use bridge::gripper::registers::Fault;
+use bridge::gripper::{Activation, Contact, Gripper, Motion, Status};
+use bridge::hae::Map;
+use bridge::hae::image::Verifier;
+use bridge::posture::Posture;
+use bridge::protocol::Outcome;
+use bridge::supervisor::{Hand, Inputs, Supervisor, Weights};
+use bridge::{Config, Instant, Platform, State, glove};
+use core::cell::Cell;
+use core::fmt::Write;
+use core::hint::black_box;
+
+/// Instructions of `work` and the little that surrounds it.
+#[inline(never)]
+fn count<T>(work: impl FnOnce() -> T) -> (u32, T) {
+    const CONTROL: *mut u32 = 0xe000_e010 as *mut u32;
+    const RELOAD: *mut u32 = 0xe000_e014 as *mut u32;
+    const VALUE: *mut u32 = 0xe000_e018 as *mut u32;
+    // SAFETY: SysTick's registers; nobody else uses them in this program, and its interrupt stays off.
+    unsafe {
+        RELOAD.write_volatile(0x00ff_ffff);
+        VALUE.write_volatile(0);
+        CONTROL.write_volatile(0b101);
+        cortex_m::asm::isb();
+        let start = VALUE.read_volatile();
+        let result = work();
+        let end = VALUE.read_volatile();
+        CONTROL.write_volatile(0);
+        let ticks = start.wrapping_sub(end) & 0x00ff_ffff;
+        (ticks * 10 / 16, result)
+    }
+}
+
+/// The greatest count of one kind of work, and how often it was done.
+#[derive(Clone, Copy, Default)]
+struct Most {
+    instructions: u32,
+    times: u32,
+}
+
+impl Most {
+    fn see(&mut self, instructions: u32) {
+        self.instructions = self.instructions.max(instructions);
+        self.times += 1;
+    }
+}
+
+struct Text<'o> {
+    room: &'o mut [u8],
+    length: usize,
+}
+
+impl Write for Text<'_> {
+    fn write_str(&mut self, text: &str) -> core::fmt::Result {
+        let end = self.length + text.len();
+        let place = self.room.get_mut(self.length..end);
+        place
+            .ok_or(core::fmt::Error)?
+            .copy_from_slice(text.as_bytes());
+        self.length = end;
+        Ok(())
+    }
+}
+
+/// Everything that is counted, a line each: name, most instructions, times done.
+pub fn all(memory: Memory) -> Option<usize> {
+    let Memory {
+        first: image,
+        second: trace,
+        output,
+        ..
+    } = memory;
+    // The replay's own output comes first and is not needed.
+    let (scratch, room) = output.split_at_mut_checked(5 << 20)?;
+    let mut text = Text { room, length: 0 };
+    let empty = count(|| ()).0;
+    let mut tell = |name: &str, most: Most| {
+        let instructions = most.instructions - empty;
+        writeln!(text, "{name} {instructions} {}", most.times).ok()
+    };
+    tell("map", map(image)?)?;
+    tell("image_check_step", check(image)?)?;
+    tell("supervisor_step", supervisor())?;
+    let [request, reply, idle, frame, late] = looped(trace, scratch)?;
+    tell("rtu_request", request)?;
+    tell("rtu_reply", reply)?;
+    tell("app_step_without_frame", idle)?;
+    tell("app_step_with_frame", frame)?;
+    tell("host_and_rest_of_turn", late)?;
+    let [sample, angles] = scanned(trace, scratch)?;
+    tell("imu_sample", sample)?;
+    tell("hand_angles", angles)?;
+    let length = text.length;
+    // To where the host looks for it.
+    let (scratch, room) = output.split_at_mut_checked(5 << 20)?;
+    scratch
+        .get_mut(..length)?
+        .copy_from_slice(room.get(..length)?);
+    Some(length)
+}
+
+fn map(image: &[u8]) -> Option<Most> {
+    let map = Map::<25, 300, 4>::from_image(image).ok()?;
+    let mut most = Most::default();
+    for sample in 0..100_u8 {
+        let q: [f32; 25] =
+            core::array::from_fn(|input| f32::from(sample.wrapping_mul(7 + input as u8)) / 256.0);
+        let (instructions, result) = count(|| black_box(black_box(&map).eval(black_box(&q))));
+        result.ok()?;
+        most.see(instructions);
+    }
+    Some(most)
+}
+
+fn check(image: &[u8]) -> Option<Most> {
+    let mut most = Most::default();
+    let mut verifier = Verifier::new(image).ok()?;
+    loop {
+        let (instructions, result) = count(|| verifier.step(image));
+        most.see(instructions);
+        if result.ok()?.is_some() {
+            return Some(most);
+        }
+    }
+}
+
+/// Steps with the clutch closed, a new frame and a new status each time, a target that moves.
+fn supervisor() -> Most {
+    let mut supervisor = Supervisor::<AXES>::new(Config::default());
+    let mut most = Most::default();
+    for step in 1..=1000_u32 {
+        let now = Instant::from_ticks(u64::from(step) * 10_000);
+        let position = [(step / 8) as u8; AXES];
+        let inputs = Inputs {
+            heartbeat: Some(now),
+            hand: Some(Hand {
+                sequence: step,
+                stamp: now,
+                output: Ok([(step % 200) as f32; AXES]),
+            }),
+            status: Some(Status {
+                stamp: now,
+                activation: Activation::Ready,
+                going_to: true,
+                contact: [Contact::AtPosition; AXES],
+                echo: position,
+                position,
+                current: [0; AXES],
+                fault: Fault::None,
+            }),
+            weights: Weights::Ready,
+        };
+        let (instructions, output) = count(|| supervisor.step(now, black_box(&inputs)));
+        black_box(output);
+        most.see(instructions);
+    }
+    most
+}
+
+/// The gripper's driver with its polls counted.
+struct Counted<'c, R> {
+    inner: R,
+    request: &'c Cell<Most>,
+    reply: &'c Cell<Most>,
+}
+
+impl<const X: usize, R: Gripper<X>> Gripper<X> for Counted<'_, R> {
+    type Error = R::Error;
+
+    fn poll(&mut self, now: Instant) -> Option<Result<Status<X>, Self::Error>> {
+        // SysTick is in use by the count of the whole step around this: read it, not set it.
+        let sent = self.inner.counters().requests;
+        let start = cortex_m::peripheral::SYST::get_current();
+        let result = self.inner.poll(now);
+        let end = cortex_m::peripheral::SYST::get_current();
+        let instructions = (start.wrapping_sub(end) & 0x00ff_ffff) * 10 / 16;
+        let kind = match &result {
+            Some(Ok(_)) => self.reply,
+            _ if self.inner.counters().requests != sent => self.request,
+            _ => return result,
+        };
+        let mut most = kind.get();
+        most.see(instructions);
+        kind.set(most);
+        result
+    }
+
+    fn set_motion(&mut self, motion: Option<Motion<X>>, stamp: Instant) {
+        self.inner.set_motion(motion, stamp);
+    }
+
+    fn activate(&mut self) {
+        self.inner.activate();
+    }
+
+    fn next_due(&self) -> Instant {
+        self.inner.next_due()
+    }
+
+    fn counters(&self) -> Counters {
+        self.inner.counters()
+    }
+}
+
+/// The whole loop over the trace: request, reply, step without and with a frame, the rest of a turn.
+fn looped(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 5]> {
+    let (request, reply) = (Cell::default(), Cell::default());
+    let tape = Tape::new(trace, scratch);
+    let mut replay = Replay::new(&tape, flash::slots(), |inner: ThreeFinger<_>| Counted {
+        inner,
+        request: &request,
+        reply: &reply,
+    });
+    let [mut without, mut with, mut rest] = [Most::default(); 3];
+    let mut followed = false;
+    while !replay.is_over() {
+        let frames = replay.app.telemetry().frame_sequence;
+        let (instructions, due) = count(|| replay.app.step());
+        let seen = replay.app.telemetry();
+        followed |= seen.state == State::Following;
+        if seen.frame_sequence == frames {
+            without.see(instructions);
+        } else {
+            with.see(instructions);
+        }
+        let (instructions, outcome) = count(|| replay.rest(due));
+        rest.see(instructions);
+        if outcome == Outcome::Reboot {
+            break;
+        }
+    }
+    followed.then_some([request.get(), reply.get(), without, with, rest])
+}
+
+/// The scanner alone: a poll that takes a sensor's sample, and the joint angles of a frame.
+fn scanned(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 2]> {
+    let tape = Tape::new(trace, scratch);
+    let mut machine = Machine::new(&tape);
+    let mut scanner = scanner(&tape);
+    let mut posture = Posture::new(
+        glove::hand::Side::Right,
+        glove::hand::Calibration::identity(),
+    );
+    let [mut sample, mut angles] = [Most::default(); 2];
+    while !tape.is_over() {
+        let now = machine.now();
+        let good = scanner.counters().good;
+        let (instructions, frame) = count(|| scanner.poll(now));
+        if scanner.counters().good != good && frame.is_none() {
+            sample.see(instructions);
+        }
+        if let Some(frame) = frame {
+            let (instructions, reading) = count(|| posture.read(black_box(&frame)));
+            if black_box(reading).is_ok() {
+                angles.see(instructions);
+            }
+        }
+        machine.wait_until(scanner.next_due().unwrap_or(now));
+    }
+    (angles.times > 0).then_some([sample, angles])
+}

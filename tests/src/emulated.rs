@@ -1,0 +1,298 @@
+//! The firmware in the emulator, in real time: the whole loop by its counters, and power cuts while weights are flashed.
+
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use bridge::State;
+use bridge::protocol::message::{Answer, Call, Counters, SlotContents};
+use gauntlet::emulator::{Emulator, Setup};
+use gauntlet::host_link::{Error, HostLink};
+use gauntlet::interrupt::Interrupt;
+use gripper::Activation;
+use rig::glove::VirtualGlove;
+use rig::gripper::VirtualGripper;
+use rig::pty::{Handle, PtyDevice};
+
+use crate::images::index_finger;
+use crate::random;
+
+/// Far more than anything here takes, also on a machine with much to do.
+const PATIENCE: Duration = Duration::from_secs(60);
+const BEAT: Duration = Duration::from_millis(80);
+
+/// One emulator at a time: a machine that is kept waiting by another one tells nothing about the loop.
+pub fn alone() -> MutexGuard<'static, ()> {
+    static ONE: Mutex<()> = Mutex::new(());
+    // A test that failed while it held the lock says so itself.
+    ONE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An emulator without glove and gripper.
+///
+/// # Panics
+/// QEMU or its folder cannot be had.
+pub fn bare(firmware: &Path) -> Emulator {
+    Emulator::new(Setup {
+        firmware: firmware.to_owned(),
+        glove: None,
+        gripper: None,
+    })
+    .expect("an emulator")
+}
+
+/// Flashes `image`; the CRC that the bridge reads back.
+///
+/// # Errors
+/// As [`HostLink::flash`].
+pub fn flash(link: &mut HostLink, image: &[u8]) -> Result<u32, Error> {
+    let never = Interrupt::never().expect("an interrupt");
+    link.flash(image, &never, &mut |_| {})
+        .map(|flashed| flashed.crc)
+}
+
+/// The active image's model id, if there is one.
+///
+/// # Panics
+/// The bridge does not answer, or its active slot holds no whole image.
+pub fn active(link: &mut HostLink) -> Option<u32> {
+    let slots = link.slots().expect("an answer");
+    match slots.contents[usize::from(slots.active?)] {
+        SlotContents::Image { model_id, .. } => Some(model_id),
+        other => panic!("the active slot is {other:?}"),
+    }
+}
+
+/// Asks until `done` says so.
+fn wait_for(link: &mut HostLink, what: &str, done: impl Fn(&mut HostLink) -> bool) {
+    let end = Instant::now() + PATIENCE;
+    while !done(link) {
+        assert!(Instant::now() < end, "{what}: {:?}", link.status());
+        std::thread::sleep(Duration::from_millis(50));
+    }
+}
+
+/// Keeps the clutch closed for `time`; the states seen.
+///
+/// # Panics
+/// The line breaks or the bridge refuses.
+pub fn hold_clutch(link: &mut HostLink, time: Duration) -> Vec<State> {
+    let end = Instant::now() + time;
+    let mut states = Vec::new();
+    while Instant::now() < end {
+        if let Some(status) = link.engage().expect("taken") {
+            states.push(status.state);
+        }
+        std::thread::sleep(BEAT);
+    }
+    states
+}
+
+/// The firmware between the virtual devices, its gripper active, its weights in place.
+pub struct Loop {
+    /// The host's line.
+    pub link: HostLink,
+    /// The gripper on UART 2.
+    pub gripper: VirtualGripper,
+    _emulator: Emulator,
+    _ports: [Handle; 2],
+}
+
+/// What a stretch of time did to the counters.
+#[derive(Debug, Clone, Copy)]
+pub struct Stretch {
+    /// How long it took here, seconds.
+    pub seconds: f64,
+    /// How long by the bridge's own clock, seconds.
+    pub bridge_seconds: f64,
+    /// The counters' growth; `bytes_lost` and `worst_late_us` since the start.
+    pub grown: Counters,
+    /// Every state seen was `Following`.
+    pub followed_throughout: bool,
+    /// Whether the gripper moved.
+    pub moved: bool,
+}
+
+impl Loop {
+    /// Starts everything; a hand opens and closes its index finger.
+    ///
+    /// # Panics
+    /// Anything does not come up within a minute.
+    pub fn start(firmware: &Path) -> Self {
+        let hand = |time_s: f64| {
+            let mut pose = [0.0; 25];
+            pose[5] = 0.6 * (1.0 - (1.5 * time_s).cos()) as f32;
+            pose
+        };
+        let glove = VirtualGlove::new(Box::new(hand), rig::glove::Config::at_baud(115_200));
+        let gripper = VirtualGripper::new(rig::gripper::Config::default());
+        let ports = [
+            PtyDevice::spawn(Box::new(glove), None).expect("a terminal"),
+            PtyDevice::spawn(Box::new(gripper.clone()), None).expect("a terminal"),
+        ];
+        let mut emulator = Emulator::new(Setup {
+            firmware: firmware.to_owned(),
+            glove: Some(ports[0].path().to_owned()),
+            gripper: Some(ports[1].path().to_owned()),
+        })
+        .expect("an emulator");
+        let mut link = emulator.link().expect("a bridge");
+        assert_eq!(active(&mut link), None);
+        flash(&mut link, &index_finger(11)).expect("weights");
+        assert_eq!(active(&mut link), Some(11));
+        wait_for(&mut link, "the glove", |link| {
+            link.status().expect("an answer").glove_answers
+        });
+        wait_for(&mut link, "the gripper", |link| {
+            link.status().expect("an answer").gripper.is_some()
+        });
+        assert_eq!(link.status().expect("an answer").state, State::Idle);
+        link.activate().expect("taken");
+        wait_for(&mut link, "the activation", |link| {
+            let gripper = link.status().expect("an answer").gripper;
+            gripper.is_some_and(|gripper| gripper.activation == Activation::Ready)
+        });
+        Self {
+            link,
+            gripper,
+            _emulator: emulator,
+            _ports: ports,
+        }
+    }
+
+    /// Holds the clutch for `time`, after 2 s for settling and blending.
+    ///
+    /// # Panics
+    /// The bridge does not answer.
+    pub fn follow(&mut self, time: Duration) -> Stretch {
+        hold_clutch(&mut self.link, Duration::from_secs(2));
+        let positions = self.gripper.positions();
+        let clock = |link: &mut HostLink| link.status().expect("an answer").now_us as f64 * 1e-6;
+        let (started, bridge_started) = (Instant::now(), clock(&mut self.link));
+        let before = self.link.counters().expect("an answer");
+        let half = hold_clutch(&mut self.link, time / 2);
+        let moved = self.gripper.positions() != positions;
+        let states = hold_clutch(&mut self.link, time - time / 2);
+        let after = self.link.counters().expect("an answer");
+        let following = |state: &State| *state == State::Following;
+        Stretch {
+            seconds: started.elapsed().as_secs_f64(),
+            bridge_seconds: clock(&mut self.link) - bridge_started,
+            grown: grown(&before, &after),
+            followed_throughout: half.iter().chain(&states).all(following)
+                && before.holds == after.holds,
+            moved,
+        }
+    }
+}
+
+fn grown(before: &Counters, after: &Counters) -> Counters {
+    let of = |of: fn(&Counters) -> u32| of(after).wrapping_sub(of(before));
+    Counters {
+        frames: of(|c| c.frames),
+        following_frames: of(|c| c.following_frames),
+        answered_frames: of(|c| c.answered_frames),
+        unusable_frames: of(|c| c.unusable_frames),
+        commands: of(|c| c.commands),
+        statuses: of(|c| c.statuses),
+        gripper_errors: of(|c| c.gripper_errors),
+        steps: of(|c| c.steps),
+        late_steps: of(|c| c.late_steps),
+        holds: of(|c| c.holds),
+        faults: of(|c| c.faults),
+        ..*after
+    }
+}
+
+/// What cutting the power many times came to.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Cuts {
+    /// Cuts.
+    pub cuts: u64,
+    /// Cuts that came before the host had its last answer.
+    pub inside: u64,
+    /// Cuts after which the new image was active.
+    pub new: u64,
+}
+
+/// Kills the emulator at `cuts` moments while an image is flashed. After each restart the bridge must answer with the
+/// old image or the new one, whole and byte for byte what was sent; after the last one more flash must read back.
+///
+/// # Panics
+/// Anything else.
+pub fn cut_power(firmware: &Path, cuts: u64, seed: u64, progress: &mut dyn FnMut(u64)) -> Cuts {
+    let mut emulator = bare(firmware);
+    let images = [index_finger(1), index_finger(2)];
+    let mut link = emulator.link().expect("a bridge");
+    let started = Instant::now();
+    let mut crcs = [flash(&mut link, &images[0]).expect("weights"), 0];
+    let whole_us = started.elapsed().as_micros() as u64;
+    crcs[1] = crc32(&images[1]);
+    assert_eq!(crcs[0], crc32(&images[0]));
+    let (mut old, mut seen) = (1, Cuts::default());
+    for cut in 0..cuts {
+        let new = 3 - old;
+        let bytes = &images[new as usize - 1];
+        // A little beyond the end, so that some cuts come in the commit and after it.
+        let at = Duration::from_micros(random(seed ^ cut) % (whole_us * 21 / 20));
+        let stop = Interrupt::never().expect("an interrupt");
+        let done = std::thread::scope(|scope| {
+            let writer = scope.spawn(|| link.flash(bytes, &stop, &mut |_| {}).is_ok());
+            std::thread::sleep(at);
+            emulator.power_off();
+            // Otherwise it would wait for the machine to come back.
+            stop.ask();
+            writer.join().expect("no panic")
+        });
+        link = emulator
+            .link()
+            .expect("the bridge answers after the restart");
+        let found = active(&mut link);
+        assert!(
+            found == Some(old) || found == Some(new),
+            "cut {cut} at {at:?}: {found:?} is active, {old} was, {new} was being written"
+        );
+        assert!(
+            !done || found == Some(new),
+            "cut {cut}: a finished flash was lost"
+        );
+        let found = found.unwrap_or(old);
+        assert_eq!(
+            active_crc(&mut link),
+            Some(crcs[found as usize - 1]),
+            "cut {cut}: bytes differ"
+        );
+        seen.cuts += 1;
+        seen.inside += u64::from(!done);
+        seen.new += u64::from(found == new);
+        old = found;
+        progress(seen.cuts);
+    }
+    let last = 3 - old;
+    flash(&mut link, &images[last as usize - 1]).expect("one clean flash");
+    emulator.power_off();
+    let mut link = emulator.link().expect("a bridge");
+    assert_eq!(active(&mut link), Some(last));
+    assert_eq!(active_crc(&mut link), Some(crcs[last as usize - 1]));
+    seen
+}
+
+/// The CRC that the bridge computes over its active image.
+fn active_crc(link: &mut HostLink) -> Option<u32> {
+    let Ok(Answer::Slots(slots)) = link.call(&Call::Slots) else {
+        return None;
+    };
+    match slots.contents[usize::from(slots.active?)] {
+        SlotContents::Image { crc, .. } => Some(crc),
+        _ => None,
+    }
+}
+
+/// CRC-32/ISO-HDLC bit by bit.
+pub fn crc32(bytes: &[u8]) -> u32 {
+    !bytes.iter().fold(!0u32, |crc, &byte| {
+        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
+            (crc >> 1) ^ (0xEDB8_8320 & (crc & 1).wrapping_neg())
+        })
+    })
+}
