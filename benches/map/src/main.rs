@@ -23,6 +23,9 @@ use network::Network;
 const LEN: usize = packed_len(25, 300, 4);
 
 fn main() -> ExitCode {
+    // candle spreads one sample over all cores otherwise, which takes longer and disturbs the others.
+    // SAFETY: there is no other thread yet.
+    unsafe { std::env::set_var("RAYON_NUM_THREADS", "1") };
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let result = match arguments[..] {

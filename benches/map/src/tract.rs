@@ -37,7 +37,17 @@ impl Tract {
     pub fn eval(&mut self, q: &[f32; 25]) -> TractResult<[f32; 4]> {
         let q = Tensor::from_shape(&[1, 25], q)?;
         let y = self.state.run(tvec!(q.into()))?;
+        clear_upper_halves();
         let y = y[0].try_as_plain_ram()?.as_slice::<f32>()?;
         Ok([y[0], y[1], y[2], y[3]])
+    }
+}
+
+/// tract's kernels leave the upper halves of the vector registers in use, which slows down SSE code after them.
+fn clear_upper_halves() {
+    #[cfg(target_arch = "x86_64")]
+    if std::is_x86_feature_detected!("avx") {
+        // SAFETY: AVX is there; the upper halves are nobody's across a call.
+        unsafe { std::arch::x86_64::_mm256_zeroupper() };
     }
 }

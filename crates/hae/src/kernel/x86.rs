@@ -1,7 +1,8 @@
 //! x86-64: SSE2, AVX2 and AVX-512 kernels on block-major weights, and the question which of them this machine runs.
 //!
 //! A lane of the definition is a lane of the vector. Several blocks are computed together, because a block's 25 additions
-//! wait for each other; the sums over blocks stay in ascending order.
+//! wait for each other; the sums over blocks stay in ascending order. How many, and how far the second half of a cache
+//! line is read behind the first, was found by measuring (docs/measurements/map.md).
 
 use core::arch::x86_64::*;
 
@@ -36,9 +37,10 @@ fn wide_vectors() -> (bool, bool) {
     (has(5, 0x06), has(16, 0xe6))
 }
 
-/// The kernel, spelt once for vectors of any width: `$n` vectors make 16 lanes, `$tile` blocks are computed together.
+/// The kernel, spelt once for vectors of any width: `$width` lanes in a vector, `$tile` blocks computed together, the
+/// second half of a row of 16 lanes (all of it, if it is one vector) `$lag` inputs behind the first.
 macro_rules! kernel {
-    ($name:ident, $feature:literal, $vector:ty, width $width:literal, tile $tile:literal,
+    ($name:ident, $feature:literal, $vector:ty, width $width:literal, tile $tile:literal, lag $lag:literal,
      $load:ident, $set1:ident, $zero:ident, $mul:ident, $add:ident, $max:ident, $tree:ident) => {
         /// f(q) on block-major weights.
         ///
@@ -51,6 +53,9 @@ macro_rules! kernel {
         ) -> [f32; X] {
             const PARTS: usize = LANES / $width;
             const TILE: usize = $tile;
+            const { assert!(TILE <= 5) };
+            const HALF: usize = PARTS / 2;
+            let lag = Q.min($lag);
             let rows = 1 + Q + X;
             let blocks = units_per_lane(H);
             debug_assert!(words.len() == blocks * rows * LANES + X);
@@ -73,13 +78,27 @@ macro_rules! kernel {
                     let mut z: [[$vector; PARTS]; $count] = core::array::from_fn(|k| {
                         core::array::from_fn(|part| row(first + k, 0, part))
                     });
-                    for i in 0..Q {
-                        let q = $set1(q[i]);
-                        for k in 0..$count {
-                            for part in 0..PARTS {
-                                z[k][part] = $add(z[k][part], $mul(row(first + k, 1 + i, part), q));
+                    macro_rules! add_input {
+                        ($input:expr, $parts:expr) => {{
+                            let i = $input;
+                            let q = $set1(q[i]);
+                            for k in 0..$count {
+                                for part in $parts {
+                                    let product = $mul(row(first + k, 1 + i, part), q);
+                                    z[k][part] = $add(z[k][part], product);
+                                }
                             }
-                        }
+                        }};
+                    }
+                    for i in 0..lag {
+                        add_input!(i, (0..PARTS).take(HALF));
+                    }
+                    for i in lag..Q {
+                        add_input!(i, (0..PARTS).take(HALF));
+                        add_input!(i - lag, (0..PARTS).skip(HALF));
+                    }
+                    for i in Q - lag..Q {
+                        add_input!(i, (0..PARTS).skip(HALF));
                     }
                     for k in 0..$count {
                         for part in 0..PARTS {
@@ -99,9 +118,13 @@ macro_rules! kernel {
                 blocks!(block, TILE);
                 block += TILE;
             }
-            while block < blocks {
-                blocks!(block, 1);
-                block += 1;
+            // The rest together as well; no tile is larger than five.
+            match blocks - block {
+                0 => {}
+                1 => blocks!(block, 1),
+                2 => blocks!(block, 2),
+                3 => blocks!(block, 3),
+                _ => blocks!(block, 4),
             }
             let b2 = blocks * rows * LANES;
             core::array::from_fn(|x| {
@@ -112,11 +135,11 @@ macro_rules! kernel {
     };
 }
 
-kernel!(sse2, "sse2", __m128, width 4, tile 3,
+kernel!(sse2, "sse2", __m128, width 4, tile 3, lag 0,
     _mm_load_ps, _mm_set1_ps, _mm_setzero_ps, _mm_mul_ps, _mm_add_ps, _mm_max_ps, tree_128);
-kernel!(avx2, "avx2", __m256, width 8, tile 6,
+kernel!(avx2, "avx2", __m256, width 8, tile 5, lag 4,
     _mm256_load_ps, _mm256_set1_ps, _mm256_setzero_ps, _mm256_mul_ps, _mm256_add_ps, _mm256_max_ps, tree_256);
-kernel!(avx512, "avx512f", __m512, width 16, tile 3,
+kernel!(avx512, "avx512f", __m512, width 16, tile 5, lag 0,
     _mm512_load_ps, _mm512_set1_ps, _mm512_setzero_ps, _mm512_mul_ps, _mm512_add_ps, _mm512_max_ps, tree_512);
 
 /// The halving tree over four vectors of four lanes.
