@@ -7,6 +7,7 @@ mod chip;
 mod network;
 mod peers;
 mod roof;
+mod size;
 mod table;
 #[cfg(feature = "tract")]
 mod tract;
@@ -15,6 +16,7 @@ mod tract;
 mod workload;
 
 use std::hint::black_box;
+use std::path::Path;
 use std::process::ExitCode;
 
 use hae::{Kernel, Map, PackedBuffer, packed_len};
@@ -34,7 +36,8 @@ fn main() -> ExitCode {
             Ok(rounds) if rounds > 0 => table::print(rounds),
             _ => Err(format!("--rounds {rounds}: give a number from 1")),
         },
-        ["--chip", image] => chip::count(image),
+        ["--chip", image] => chip::count(image)
+            .and_then(|()| size::print(&Path::new(image).with_file_name("footprint"))),
         ["--valgrind"] => chip::valgrind(),
         ["--evaluate", kernel, times] => evaluate(kernel, times),
         _ => {

@@ -83,17 +83,19 @@ impl<'w, const Q: usize, const H: usize, const X: usize> Map<'w, Q, H, X> {
     /// `None` if the token cannot belong to these bytes: other length, alignment, CRC field, or a shape that is not
     /// this map's. It does not read the parameters. The joint order is the caller's to compare.
     pub fn view(bytes: &'w [u8], checked: &Checked) -> Option<Self> {
-        if [checked.inputs, checked.hidden, checked.outputs] != [Q, H, X]
+        // One by one: two arrays would be compared by a call.
+        if checked.inputs != Q
+            || checked.hidden != H
+            || checked.outputs != X
             || image::stated_crc(bytes) != checked.crc
         {
             return None;
         }
-        let words = bytes.get(HEADER_LEN..checked.length)?;
+        let words: &[u32] =
+            bytemuck::try_cast_slice(bytes.get(HEADER_LEN..checked.length)?).ok()?;
         let weights = match checked.element {
-            Element::F32 => Parts::Float(Weights::in_image(bytemuck::try_cast_slice(words).ok()?)?),
-            Element::I16 => Parts::Integer(IntegerWeights::in_image(
-                bytemuck::try_cast_slice(words).ok()?,
-            )?),
+            Element::F32 => Parts::Float(Weights::in_image(bytemuck::cast_slice(words))?),
+            Element::I16 => Parts::Integer(IntegerWeights::in_image(words)?),
         };
         Some(Self { weights })
     }
