@@ -4,6 +4,8 @@ pub mod bits;
 pub mod chip;
 pub mod emulated;
 pub mod images;
+pub mod power_cuts;
+pub mod slot_contents;
 pub mod trace;
 
 #[allow(missing_docs)]

@@ -8,9 +8,9 @@ use std::rc::Rc;
 
 use bridge::protocol::message::{CHUNK, Call, Request, VERSION};
 use bridge::protocol::{Outcome, Server, frame};
-use bridge::{App, Config, Instant, Platform, Slot, State, WeightsStore};
+use bridge::{App, Config, Instant, Platform, State, WeightsStore};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use embedded_storage::nor_flash::{ErrorType as FlashErrorType, NorFlash, ReadNorFlash};
+use gauntlet::slots::MemorySlot;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
 use rig::faulty::{Faults, Faulty};
@@ -20,6 +20,7 @@ use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
 
 use crate::bits::Pose;
+use crate::images;
 use crate::replay::{AXES, GLOVE, GRIPPER, HOST, Record};
 
 const BAUD: u32 = 115_200;
@@ -34,48 +35,9 @@ const UP: u64 = 6_000_000;
 /// The virtual gripper has activated by then, µs.
 const ACTIVE: u64 = 20_000_000;
 
-/// A slot of the weights store in memory.
-#[derive(Debug)]
-pub struct FlashSlot(pub Nor);
-
 /// Two erased slots as large as the board's.
-pub fn slots() -> [FlashSlot; 2] {
-    [FlashSlot(Nor::new(SLOT)), FlashSlot(Nor::new(SLOT))]
-}
-
-impl FlashErrorType for FlashSlot {
-    type Error = rig::flash::Error;
-}
-
-impl ReadNorFlash for FlashSlot {
-    const READ_SIZE: usize = Nor::<4, 4096>::READ_SIZE;
-
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
-        self.0.read(offset, bytes)
-    }
-
-    fn capacity(&self) -> usize {
-        self.0.capacity()
-    }
-}
-
-impl NorFlash for FlashSlot {
-    const WRITE_SIZE: usize = Nor::<4, 4096>::WRITE_SIZE;
-    const ERASE_SIZE: usize = Nor::<4, 4096>::ERASE_SIZE;
-
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
-        self.0.erase(from, to)
-    }
-
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
-        self.0.write(offset, bytes)
-    }
-}
-
-impl Slot for FlashSlot {
-    fn mapped(&self) -> &[u8] {
-        self.0.mapped()
-    }
+pub fn slots() -> [MemorySlot; 2] {
+    [MemorySlot(Nor::new(SLOT)), MemorySlot(Nor::new(SLOT))]
 }
 
 /// A trace and what the bridge did while it was recorded.
@@ -89,7 +51,15 @@ pub struct Recorded {
     pub holds: u32,
 }
 
-/// Records `seconds` of a moving hand under a closed clutch, after flashing `image`. `faulty`: bytes of all lines are lost
+/// Five seconds of a hand that moves all its joints, with a map that a gripper can follow.
+pub fn short(seed: u64, faulty: bool) -> Recorded {
+    let hand = |time_s: f64| -> Pose {
+        core::array::from_fn(|joint| 0.4 * (time_s * (1.0 + joint as f64 / 10.0)).sin() as f32)
+    };
+    record(&images::gentle(seed), hand, 5, faulty, seed)
+}
+
+/// Records `seconds` of a moving hand under a closed clutch, after flashing `image` (nothing, when it is empty). `faulty`: bytes of all lines are lost
 /// and changed now and then. `hand` gives the pose at a time in seconds; the same `seed` gives the same trace.
 pub fn record(
     image: &[u8],
@@ -312,7 +282,7 @@ impl<'i> Host<'i> {
         let image = self.image;
         if self.sequence == 0 {
             self.say(line, Call::Hello { version: VERSION });
-        } else if self.sequence == 1 {
+        } else if self.sequence == 1 && !image.is_empty() {
             self.say(
                 line,
                 Call::WeightsBegin {
@@ -326,7 +296,7 @@ impl<'i> Host<'i> {
             let bytes = &image[self.offset..end];
             self.offset = end;
             self.say(line, Call::WeightsChunk { offset, bytes });
-        } else if self.offset == image.len() {
+        } else if self.offset == image.len() && !image.is_empty() {
             self.offset += 1;
             self.say(line, Call::WeightsCommit);
         } else if !self.activated && now >= UP {

@@ -8,7 +8,7 @@ use loop_tests::chip::{self, bench};
 use loop_tests::emulated::alone;
 use loop_tests::images::{self, SHAPE};
 use loop_tests::replay::{self, GLOVE, GRIPPER, HOST, Record, VALUES, records};
-use loop_tests::trace::{Recorded, record, slots};
+use loop_tests::trace::{short, slots};
 
 const SEED: u64 = 1;
 
@@ -24,10 +24,6 @@ fn the_map_gives_the_same_bits_here_and_on_the_chip() {
         inputs.len()
     );
     assert!(inputs.len() >= 10_000 && refused > 50);
-}
-
-fn moving_hand(time_s: f64) -> bits::Pose {
-    core::array::from_fn(|joint| 0.4 * (time_s * (1.0 + joint as f64 / 10.0)).sin() as f32)
 }
 
 fn replayed_here(trace: &[u8]) -> Vec<u8> {
@@ -46,14 +42,9 @@ fn sorts(output: &[u8]) -> [usize; 4] {
     [HOST, GLOVE, GRIPPER, VALUES].map(|port| records(output).filter(|r| r.port == port).count())
 }
 
-fn trace(faulty: bool) -> Recorded {
-    let image = images::gentle(SEED);
-    record(&image, moving_hand, 5, faulty, SEED)
-}
-
 #[test]
 fn a_stored_trace_commands_the_gripper_and_twice_in_the_same_way() {
-    let recorded = trace(false);
+    let recorded = short(SEED, false);
     let (following, holds) = (recorded.following_frames, recorded.holds);
     assert!(following > 100 && holds <= 1, "{following} {holds}");
     let output = replayed_here(&recorded.trace);
@@ -73,7 +64,7 @@ fn a_stored_trace_gives_the_same_commands_here_and_on_the_chip() {
     let Some(bench) = bench() else { return };
     let _alone = alone();
     for faulty in [false, true] {
-        let recorded = trace(faulty);
+        let recorded = short(SEED, faulty);
         let here = replayed_here(&recorded.trace);
         let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false).expect("an output");
         let pairs = records(&here).zip(records(&chip));

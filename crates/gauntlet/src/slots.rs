@@ -1,27 +1,20 @@
-//! A place for a weights image on a PC: memory that behaves as NOR flash.
+//! A place for a weights image on a PC: memory that behaves as NOR flash ([`rig::flash::Nor`]).
 //!
-//! Erased bytes read FF, writing clears bits, erasing goes by blocks: the weights store runs the very code it runs on a
+//! Erased bytes read FF, a program unit is written once between erases: the weights store runs the very code it runs on a
 //! chip. Nothing is kept over the end of the tool; it brings the model along each time.
 
-use embedded_storage::nor_flash::{
-    ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
-};
+use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
+use rig::flash::{Error, Nor};
 
 /// Bytes in a slot: an image of the map 25 × 300 × 4 takes about 36 kB.
 pub const CAPACITY: usize = 64 * 1024;
-/// Bytes erased at once.
-const BLOCK: usize = 4096;
-/// Bytes written at once.
-const WORD: usize = 4;
-/// The image's arrays are read in place and must start on such an address.
-const ALIGNMENT: usize = 64;
 
-/// One slot for a weights image.
+/// One slot for a weights image, of program unit `WRITE` and sector `ERASE`, in bytes.
 #[derive(Debug)]
-pub struct MemorySlot {
-    bytes: Vec<u8>,
-    start: usize,
-}
+pub struct MemorySlot<const WRITE: usize = 4, const ERASE: usize = 4096>(
+    /// The flash under it.
+    pub Nor<WRITE, ERASE>,
+);
 
 impl Default for MemorySlot {
     fn default() -> Self {
@@ -32,67 +25,42 @@ impl Default for MemorySlot {
 impl MemorySlot {
     /// An erased slot of [`CAPACITY`] bytes.
     pub fn new() -> Self {
-        let bytes = vec![0xFF; CAPACITY + ALIGNMENT];
-        // The heap block stays where it is when the slot moves.
-        let start = bytes.as_ptr().align_offset(ALIGNMENT).min(ALIGNMENT);
-        Self { bytes, start }
-    }
-
-    fn all(&self) -> &[u8] {
-        self.bytes
-            .get(self.start..self.start + CAPACITY)
-            .unwrap_or_default()
-    }
-
-    fn range_mut(&mut self, offset: u32, length: usize) -> Result<&mut [u8], NorFlashErrorKind> {
-        let from = self.start + offset as usize;
-        self.bytes
-            .get_mut(from..from + length)
-            .ok_or(NorFlashErrorKind::OutOfBounds)
+        Self(Nor::new(CAPACITY))
     }
 }
 
-impl ErrorType for MemorySlot {
-    type Error = NorFlashErrorKind;
+impl<const WRITE: usize, const ERASE: usize> ErrorType for MemorySlot<WRITE, ERASE> {
+    type Error = Error;
 }
 
-impl ReadNorFlash for MemorySlot {
-    const READ_SIZE: usize = 1;
+impl<const WRITE: usize, const ERASE: usize> ReadNorFlash for MemorySlot<WRITE, ERASE> {
+    const READ_SIZE: usize = Nor::<WRITE, ERASE>::READ_SIZE;
 
-    fn read(&mut self, offset: u32, out: &mut [u8]) -> Result<(), Self::Error> {
-        check_read(self, offset, out.len())?;
-        let length = out.len();
-        out.copy_from_slice(self.range_mut(offset, length)?);
-        Ok(())
+    fn read(&mut self, offset: u32, out: &mut [u8]) -> Result<(), Error> {
+        self.0.read(offset, out)
     }
 
     fn capacity(&self) -> usize {
-        CAPACITY
+        self.0.capacity()
     }
 }
 
-impl NorFlash for MemorySlot {
-    const WRITE_SIZE: usize = WORD;
-    const ERASE_SIZE: usize = BLOCK;
+impl<const WRITE: usize, const ERASE: usize> NorFlash for MemorySlot<WRITE, ERASE> {
+    const WRITE_SIZE: usize = WRITE;
+    const ERASE_SIZE: usize = ERASE;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Self::Error> {
-        check_erase(self, from, to)?;
-        self.range_mut(from, (to - from) as usize)?.fill(0xFF);
-        Ok(())
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), Error> {
+        self.0.erase(from, to)
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Self::Error> {
-        check_write(self, offset, bytes.len())?;
-        for (cell, byte) in self.range_mut(offset, bytes.len())?.iter_mut().zip(bytes) {
-            *cell &= byte;
-        }
-        Ok(())
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Error> {
+        self.0.write(offset, bytes)
     }
 }
 
-impl bridge::Slot for MemorySlot {
+impl<const WRITE: usize, const ERASE: usize> bridge::Slot for MemorySlot<WRITE, ERASE> {
     fn mapped(&self) -> &[u8] {
-        self.all()
+        self.0.mapped()
     }
 }
 
@@ -102,26 +70,14 @@ mod tests {
     use bridge::Slot;
 
     #[test]
-    fn mapped_bytes_are_aligned_and_whole_wherever_the_slot_moves() {
-        let slots: Vec<MemorySlot> = (0..5).map(|_| MemorySlot::new()).collect();
-        for slot in &slots {
-            assert_eq!(slot.mapped().len(), CAPACITY);
-            assert_eq!(slot.mapped().as_ptr() as usize % ALIGNMENT, 0);
-        }
-    }
-
-    #[test]
-    fn writing_only_clears_bits_and_erasing_sets_them() {
-        let mut slot = MemorySlot::new();
-        slot.write(8, &[0xF0; 4]).unwrap();
-        slot.write(8, &[0x0F; 4]).unwrap();
-        assert_eq!(slot.mapped()[8..12], [0; 4]);
-        slot.erase(0, 4096).unwrap();
-        assert_eq!(slot.mapped()[8..12], [0xFF; 4]);
-        assert_eq!(slot.write(2, &[0; 4]), Err(NorFlashErrorKind::NotAligned));
-        assert_eq!(
-            slot.erase(0, 2 * CAPACITY as u32),
-            Err(NorFlashErrorKind::OutOfBounds)
+    fn a_slot_is_erased_aligned_and_takes_an_image_of_the_hand() {
+        let slot = MemorySlot::new();
+        assert_eq!(slot.mapped().len(), CAPACITY);
+        assert!(slot.mapped().iter().all(|&byte| byte == 0xFF));
+        assert_eq!(slot.mapped().as_ptr() as usize % 64, 0);
+        assert!(
+            hae::image::encoded_len(25, bridge::HIDDEN, 4)
+                <= CAPACITY - MemorySlot::<4>::ERASE_SIZE
         );
     }
 }

@@ -81,6 +81,7 @@ pub struct Nor<const WRITE: usize = 4, const ERASE: usize = 4096> {
     capacity: usize,
     counts: Counts,
     power: Power,
+    by_unit: bool,
 }
 
 impl<const WRITE: usize, const ERASE: usize> Nor<WRITE, ERASE> {
@@ -103,7 +104,16 @@ impl<const WRITE: usize, const ERASE: usize> Nor<WRITE, ERASE> {
             capacity,
             counts: Counts::default(),
             power: power.clone(),
+            by_unit: false,
         }
+    }
+
+    /// Every program unit becomes an operation of its own that the power can fail at, as on a chip that programs unit by
+    /// unit. Without this a call of `write` is one operation, as on a chip that programs pages.
+    #[must_use]
+    pub fn by_unit(mut self) -> Self {
+        self.by_unit = true;
+        self
     }
 
     /// The bytes as the processor sees them; the first lies on a 64-byte boundary.
@@ -179,15 +189,21 @@ impl<const WRITE: usize, const ERASE: usize> NorFlash for Nor<WRITE, ERASE> {
         if !power.is_on() {
             return Err(Error::PowerLost);
         }
+        let at_once = if self.by_unit { WRITE } else { bytes.len() };
         let cells = &mut self.cells_mut()[from..from + bytes.len()];
         if let Some(used) = cells.iter().position(|c| *c != ERASED) {
             let offset = u32::try_from(from + used).unwrap_or(u32::MAX);
             return Err(Error::NotErased { offset });
         }
-        power.operate(|torn| match torn {
-            None => cells.copy_from_slice(bytes),
-            Some(torn) => torn.program(cells, bytes, WRITE),
-        })?;
+        for (cells, bytes) in cells
+            .chunks_mut(at_once.max(1))
+            .zip(bytes.chunks(at_once.max(1)))
+        {
+            power.operate(|torn| match torn {
+                None => cells.copy_from_slice(bytes),
+                Some(torn) => torn.program(cells, bytes, WRITE),
+            })?;
+        }
         self.counts.programs += 1;
         self.counts.programmed_bytes += bytes.len() as u64;
         Ok(())

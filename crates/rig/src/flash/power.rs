@@ -22,8 +22,8 @@ pub enum Phase {
 /// One planned power cut.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Cut {
-    /// Operations that still complete: 0 hits the next one. A `write` call is one operation, each
-    /// erased sector is one.
+    /// Operations that still complete: 0 hits the next one. A `write` call is one operation, or
+    /// each of its program units ([`Nor::by_unit`](super::Nor::by_unit)); each erased sector is one.
     pub after_operations: u64,
     /// Where in that operation.
     pub phase: Phase,

@@ -133,3 +133,19 @@ fn one_supply_takes_all_its_flashes() {
     assert_eq!(a.write(0, &[0; 4]), Err(Error::PowerLost));
     assert_eq!(power.operations(), 1);
 }
+
+#[test]
+fn unit_by_unit_a_cut_stands_between_any_two_units() {
+    for after_operations in 0..16 {
+        let mut flash = Flash::new(256).by_unit();
+        flash.power().plan(Cut {
+            after_operations,
+            phase: Phase::Before,
+            seed: 0,
+        });
+        assert_eq!(flash.write(0, &[7; 64]), Err(Error::PowerLost));
+        let done = after_operations as usize * 4;
+        assert!(flash.mapped()[..done].iter().all(|cell| *cell == 7));
+        assert!(flash.mapped()[done..].iter().all(|cell| *cell == 255));
+    }
+}
