@@ -155,51 +155,65 @@ fn a_gripper_that_was_late_for_a_while_is_back_as_soon_as_it_answers_in_time() {
     assert!(worst <= 400);
 }
 
+/// A gripper that closes by full stroke, never told more than 40 counts past where it is, on a wire that is cut after `cut`
+/// characters. Returns how far each axis went on after that, and how many characters passed.
+fn stroke_cut_after(cut: u64) -> ([f32; 4], u64) {
+    const TARGET: [u8; 4] = [250, 250, 250, 100];
+    let mut bench = three();
+    bench.truth.preset_active();
+    let mut status = bench.cycle();
+    let before = bench.wire.passed();
+    bench.wire.cut_after(cut);
+    let end = bench.clock.now() + Duration::from_millis(5_000);
+    let mut at_cut = bench.truth.positions();
+    while !bench.wire.is_cut() && bench.clock.now() < end {
+        // Taken before the characters of this turn pass.
+        at_cut = bench.truth.positions();
+        if status.position[..3].iter().all(|count| *count >= 245) {
+            break;
+        }
+        let motion = Motion {
+            position: core::array::from_fn(|axis| {
+                let here = status.position[axis];
+                TARGET[axis].clamp(here.saturating_sub(40), here.saturating_add(40))
+            }),
+            speed: [255; 4],
+            force: [100; 4],
+        };
+        bench.driver.set_motion(Some(motion), bench.clock.now());
+        let now = bench.clock.now();
+        match bench.driver.poll(now) {
+            Some(Ok(fresh)) => status = fresh,
+            Some(Err(error)) => panic!("{error}"),
+            None => bench
+                .clock
+                .wait_until(bench.driver.next_due().max(now + Duration::from_micros(1))),
+        }
+        bench.truth.run_until(bench.clock.now());
+    }
+    bench.wire.cut_after(0);
+    bench.clock.advance(Duration::from_millis(3_000));
+    bench.truth.run_until(bench.clock.now());
+    let after = bench.truth.positions();
+    let further = core::array::from_fn(|axis| (after[axis] - at_cut[axis]).abs());
+    (further, bench.wire.passed() - before)
+}
+
 #[test]
 fn cutting_the_wire_at_every_byte_leaves_no_axis_more_than_forty_counts_further() {
+    let (_, whole) = stroke_cut_after(u64::MAX);
     let mut worst = 0.0_f32;
-    let mut cuts = 0;
-    // Every byte of a full stroke is one of some 4,000; every 7th start, each byte of its cycle.
-    for cut_at in (0..4_200_u64).step_by(7) {
-        let mut bench = three();
-        bench.activate();
-        bench.go([10, 10, 10, 100]);
-        let from = bench.wire.traffic();
-        let sent =
-            |bench: &Three| bench.wire.traffic().0 + bench.wire.traffic().1 - from.0 - from.1;
-        let mut status = bench.cycle();
-        // Towards 250, never asking for more than 40 counts past the measured position.
-        while sent(&bench) < cut_at && bench.clock.now().as_ticks() < 60_000_000 {
-            let position = status
-                .position
-                .map(|count| count.saturating_add(40).min(250));
-            let motion = Motion {
-                position: [position[0], position[1], position[2], 100],
-                speed: [255; 4],
-                force: [100; 4],
-            };
-            bench.driver.set_motion(Some(motion), bench.clock.now());
-            let now = bench.clock.now();
-            match bench.driver.poll(now) {
-                Some(Ok(fresh)) => status = fresh,
-                Some(Err(error)) => panic!("{error}"),
-                None => bench
-                    .clock
-                    .wait_until(bench.driver.next_due().max(now + Duration::from_micros(1))),
-            }
-        }
-        bench.wire.unplug(true);
-        let at_cut = bench.truth.positions();
-        bench.clock.advance(Duration::from_millis(5_000));
-        bench.truth.run_until(bench.clock.now());
-        for (axis, (before, after)) in at_cut.iter().zip(bench.truth.positions()).enumerate() {
-            worst = worst.max(after - before);
+    for cut in 0..whole {
+        let (further, passed) = stroke_cut_after(cut);
+        assert_eq!(passed, cut);
+        for (axis, counts) in further.into_iter().enumerate() {
             assert!(
-                after - before <= 40.5,
-                "cut after {cut_at} bytes: axis {axis} went on {before} → {after}"
+                counts <= 40.0,
+                "cut after {cut} bytes: axis {axis} went on by {counts}"
             );
+            worst = worst.max(counts);
         }
-        cuts += 1;
     }
-    println!("{cuts} cuts: the furthest an axis went on is {worst:.1} counts");
+    println!("{whole} cuts, one at every byte of a full stroke: at most {worst:.1} counts further");
+    assert!(whole > 3_000 && worst > 20.0);
 }

@@ -39,6 +39,10 @@ pub struct Line<D> {
     noise: ChaCha8Rng,
     sent: u64,
     received: u64,
+    /// Characters that have passed, both ways.
+    passed: u64,
+    /// The wire is cut when this many have passed.
+    cut_at: Option<u64>,
 }
 
 /// Time of one character in ns at `baud`.
@@ -72,6 +76,8 @@ impl<D: Device> Line<D> {
             noise: ChaCha8Rng::seed_from_u64(0x004E_4F49_5345),
             sent: 0,
             received: 0,
+            passed: 0,
+            cut_at: None,
         }
     }
 
@@ -98,6 +104,29 @@ impl<D: Device> Line<D> {
     /// Bytes the client has sent, and bytes that have come back to it.
     pub fn traffic(&self) -> (u64, u64) {
         (self.sent, self.received)
+    }
+
+    /// Characters that have passed, both ways together, each counted when it leaves its sender's hands: for the device's
+    /// that is when it begins to answer.
+    pub fn passed(&self) -> u64 {
+        self.passed
+    }
+
+    /// Cuts the wire when `count` more characters have passed: those after them are lost, both ways, and nobody is told.
+    pub fn cut_after(&mut self, count: u64) {
+        self.cut_at = Some(self.passed.saturating_add(count));
+    }
+
+    /// Whether the wire has been cut.
+    pub fn is_cut(&self) -> bool {
+        self.cut_at.is_some_and(|at| self.passed >= at)
+    }
+
+    /// Counts one character; `false` where it is lost in a cut.
+    fn pass(&mut self) -> bool {
+        let passes = !self.is_cut();
+        self.passed += u64::from(passes);
+        passes
     }
 
     /// Takes what fits of `bytes` into the client's send queue at `now`; returns how many.
@@ -192,6 +221,9 @@ impl<D: Device> Line<D> {
 
     fn deliver(&mut self, flying: &Flying) {
         let at = instant(flying.arrival);
+        if !self.pass() {
+            return;
+        }
         if same_rate(flying.baud, self.device.baud()) {
             self.device.receive(&[flying.byte], at);
             return;
@@ -221,6 +253,9 @@ impl<D: Device> Line<D> {
     }
 
     fn send_to_client(&mut self, byte: u8, at: Instant) {
+        if !self.pass() {
+            return;
+        }
         let baud = self.device.baud();
         self.device_busy = self.device_busy.max(ns(at)) + character_ns(baud);
         let byte = if same_rate(baud, self.baud) {
@@ -327,6 +362,21 @@ mod tests {
         assert!(count > 100, "echo and noise, got {count}");
         let right = out[..count].iter().filter(|b| **b == 8).count();
         assert!(right < count / 8, "{right} of {count} right by chance");
+    }
+
+    #[test]
+    fn a_cut_wire_lets_so_many_characters_pass_and_no_more() {
+        for cut in 0..8 {
+            let mut line = Echo::line(0, 115_200);
+            line.cut_after(cut);
+            line.write(&[1, 2, 3], at(0));
+            let mut out = [0; 8];
+            let answered = line.read(&mut out, at(10_000)) as u64;
+            // Characters go out and come back in turns here.
+            assert_eq!(answered, (cut / 2).min(3), "{cut}");
+            assert_eq!(line.passed(), cut.min(6));
+            assert_eq!(line.is_cut(), cut <= 6);
+        }
     }
 
     #[test]

@@ -84,6 +84,26 @@ impl MemoryWire {
         }
     }
 
+    /// Cuts the wire in its middle when `count` more characters have passed, both ways together: what comes after them is
+    /// lost, and neither end is told.
+    pub fn cut_after(&self, count: u64) {
+        let mut line = lock(&self.core.line);
+        line.run_until(self.clock.now());
+        line.cut_after(count);
+    }
+
+    /// Whether the wire has been cut.
+    #[must_use]
+    pub fn is_cut(&self) -> bool {
+        lock(&self.core.line).is_cut()
+    }
+
+    /// Characters that have passed, both ways together.
+    #[must_use]
+    pub fn passed(&self) -> u64 {
+        lock(&self.core.line).passed()
+    }
+
     /// Bytes sent by this end, and bytes read by it.
     #[must_use]
     pub fn traffic(&self) -> (u64, u64) {
