@@ -1,9 +1,11 @@
-//! One entry for the project's chores: `cargo xtask test | firmware | qemu | bench | docs`.
+//! One entry for the project's chores: `cargo xtask test | firmware | qemu | bench | campaign | fuzz | docs`.
 //!
 //! The chores only start other programs (cargo, rustup, apt-get, qemu); what they check lives in the crates.
 
 mod bench;
+mod campaign;
 mod firmware;
+mod fuzz;
 mod step;
 mod test;
 mod thumb;
@@ -20,6 +22,9 @@ chores:
   qemu                start the firmware in QEMU, its three ports as sockets in a private folder
   bench map           the map's kernels against peers and against this machine's roof
   bench train         the time of a training step and of a model
+  campaign gripper    the gripper's long campaigns: rates beside the glove, cut wires; minutes
+  fuzz [--short]      the fuzz targets under cargo-fuzz, 10 minutes each (30 s with --short); where
+                      there is no nightly compiler, on stable
   docs                build the documentation, warnings are errors
 
 options of test:
@@ -35,6 +40,9 @@ fn main() -> ExitCode {
         ["qemu"] => firmware::emulate(),
         ["bench", "map"] => bench::map(),
         ["bench", "train"] => bench::train(),
+        ["campaign", "gripper"] => campaign::gripper(),
+        ["fuzz"] => fuzz::run(fuzz::Length::Long),
+        ["fuzz", "--short"] => fuzz::run(fuzz::Length::Short),
         ["docs"] => test::docs(),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");

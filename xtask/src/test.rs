@@ -15,7 +15,12 @@ pub enum Scope {
 }
 
 /// Packages with a lock file of their own, outside the workspace.
-const OUTSIDE: [&str; 3] = ["firmware-sim", "crates/hae/qemu-count", "benches/map"];
+const OUTSIDE: [&str; 4] = [
+    "firmware-sim",
+    "crates/hae/qemu-count",
+    "benches/map",
+    "fuzz",
+];
 
 /// Format, clippy, documentation, the microcontroller's builds, and all tests.
 pub fn run(scope: Scope) -> Result<(), Failure> {

@@ -1,0 +1,9 @@
+//! A link under a list of operations.
+#![no_main]
+
+#[path = "../../crates/gripper/tests/support/mod.rs"]
+mod support;
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| {
+    let _ = support::fuzz::link(data);
+});
