@@ -6,6 +6,7 @@
 mod glove;
 mod gripper;
 mod raw;
+mod search;
 
 use serde::Serialize;
 
@@ -29,7 +30,7 @@ pub enum Verdict {
 /// What was found at one layer.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
-    /// The layer: `port`, `line`, `unit`, `gripper`, `bridge`, `multiplexer`, `sensors`.
+    /// The layer: `port`, `address`, `connection`, `line`, `unit`, `search`, `gripper`, `bridge`, `bus`, `multiplexer`, `sensors`.
     pub layer: &'static str,
     /// How it is meant.
     pub verdict: Verdict,

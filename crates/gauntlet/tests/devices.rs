@@ -3,24 +3,14 @@
 
 mod support;
 
-use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use std::io::Read;
-use std::os::fd::OwnedFd;
 use std::process::{Child, Stdio};
 use std::thread::JoinHandle;
 use std::time::Duration;
+use support::devices::silent_port;
 use support::{
     Simulation, command, finish, interrupt, json, model, refusal, run, text, until_line, wait,
 };
-
-/// A terminal with nobody behind it.
-fn silent_port() -> (OwnedFd, String) {
-    let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
-    grantpt(&master).unwrap();
-    unlockpt(&master).unwrap();
-    let name = ptsname(&master, Vec::new()).unwrap();
-    (master, name.into_string().unwrap())
-}
 
 fn teleop(glove: &str, gripper: &str, more: &[&str]) -> Vec<String> {
     let mut arguments = vec!["teleop", "--glove", glove, "--gripper", gripper, "--model"];

@@ -20,7 +20,7 @@ Examples:
   gauntlet doctor --gripper tcp:192.168.1.11 --json
 
 Nothing moves: a gripper is only read. A glove's sensors are brought up. A gripper that does not answer
-is looked for at other speeds and under every unit number, which takes up to 15 seconds.
+is looked for at other speeds and under every unit number, which takes up to half a minute (Ctrl-C ends it).
 Exit code 1 when something is wrong.")]
 pub struct Doctor {
     /// The gripper's serial port, or `tcp:HOST[:PORT]`.
@@ -66,6 +66,9 @@ pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
             })
             .collect();
         out::json(&json!({ "devices": devices, "wrong": faults }))?;
+    }
+    if interrupt.asked() {
+        return Err(Failure::interrupted("before everything was examined").into());
     }
     match faults {
         0 => Ok(()),

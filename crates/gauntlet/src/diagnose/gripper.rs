@@ -10,6 +10,7 @@ use gripper::{Activation, Fault, Gripper, Status};
 
 use super::Findings;
 use super::raw::{Heard, ask_status};
+use super::search::{Found, OTHER_BAUDS, Outcome, TRIES, UNIT, persist, search};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::line::{Line, Settings};
@@ -17,16 +18,10 @@ use crate::platform::Clock;
 use crate::port::{BAUD, Port};
 use crate::{ports, tcp, words};
 
-/// Unit as delivered.
-const UNIT: u8 = 9;
-/// Speeds a Robotiq gripper can be set to, the usual one left out.
-const OTHER_BAUDS: [u32; 5] = [57_600, 38_400, 19_200, 9_600, 230_400];
-/// Questions before silence is believed.
-const TRIES: usize = 3;
-/// For an answer: an adapter with a 16 ms latency timer, and a PC with other work.
+/// For an answer to a longer read.
 const WAIT: Duration = Duration::from_millis(80);
-/// For an answer of each of 247 units.
-const UNIT_WAIT: Duration = Duration::from_millis(40);
+/// Units that gateways and other programs use instead of the gripper's own.
+const OTHER_TCP_UNITS: [u8; 4] = [9, 1, 255, 0];
 /// Reads to see how well the line does.
 const SAMPLE: Duration = Duration::from_secs(1);
 
@@ -51,15 +46,46 @@ fn network(address: &tcp::Address, findings: &mut Findings, interrupt: &Interrup
         }
     };
     findings.good("connection", format!("{address} accepts"));
-    let config = port.driver_config();
-    let mut driver = ThreeFinger::new(Line::Tcp(port), config);
-    match sample(&mut driver, interrupt) {
-        Some(status) => says(&status, "3-Finger gripper", findings),
-        None => {
-            let error = driver.serial_mut().error().unwrap_or(tcp::Error::Timeout);
-            findings.wrong("gripper", error.to_string(), error.next_step());
+    let error = match network_status(port, interrupt) {
+        Ok(status) => return says(&status, "3-Finger gripper", findings),
+        Err(error) => error,
+    };
+    let silent = matches!(error, tcp::Error::Timeout | tcp::Error::Exception(_));
+    for unit in OTHER_TCP_UNITS.into_iter().filter(|_| silent) {
+        let Ok(port) = tcp::Port::connect(address, unit, interrupt) else {
+            continue;
+        };
+        if let Ok(status) = network_status(port, interrupt) {
+            findings.wrong(
+                "unit",
+                format!("unit {unit} answers, not unit {}", tcp::UNIT),
+                format!("`gauntlet gripper … --unit {unit}`"),
+            );
+            return says(&status, "3-Finger gripper", findings);
         }
     }
+    if interrupt.asked() {
+        return interrupted(findings);
+    }
+    let tried = OTHER_TCP_UNITS.map(|unit| unit.to_string()).join(", ");
+    let what = if silent {
+        format!("{error}; asked unit {}, then {tried}", tcp::UNIT)
+    } else {
+        error.to_string()
+    };
+    findings.wrong("gripper", what, error.next_step());
+}
+
+/// Reads for a second; the newest status, or what is wrong with the line.
+fn network_status(port: tcp::Port, interrupt: &Interrupt) -> Result<Status<4>, tcp::Error> {
+    let config = port.driver_config();
+    let mut driver = ThreeFinger::new(Line::Tcp(port), config);
+    sample(&mut driver, interrupt)
+        .ok_or_else(|| driver.serial_mut().error().unwrap_or(tcp::Error::Timeout))
+}
+
+fn interrupted(findings: &mut Findings) {
+    findings.note("search", "interrupted before it was done", "again");
 }
 
 fn serial(path: &Path, findings: &mut Findings, interrupt: &Interrupt) {
@@ -82,92 +108,75 @@ fn serial(path: &Path, findings: &mut Findings, interrupt: &Interrupt) {
         return talk(port, Settings::default(), findings, interrupt);
     }
     drop(port);
-    if let Some(baud) = other_baud(path, interrupt) {
-        findings.wrong(
-            "line",
-            format!("unit {UNIT} answers at {baud} baud, not at {BAUD}"),
-            format!("`gauntlet gripper … --baud {baud}`, or set {BAUD} in the maker's tool"),
-        );
-        let settings = Settings {
-            baud: Some(baud),
-            unit: None,
-        };
-        return reopen(path, settings, findings, interrupt);
-    }
-    if let Some(unit) = other_unit(path, &first, interrupt) {
-        findings.wrong(
+    if let Heard::Exception(code) = first {
+        return findings.wrong(
             "unit",
-            format!("unit {unit} answers at {BAUD} baud, not unit {UNIT}"),
-            format!("`gauntlet gripper … --unit {unit}`, or set {UNIT} in the maker's tool"),
+            format!("unit {UNIT} refuses a status read with exception {code:02X}"),
+            "whether this device is a Robotiq gripper",
         );
-        let settings = Settings {
-            unit: Some(unit),
-            baud: None,
-        };
-        return reopen(path, settings, findings, interrupt);
     }
-    nobody(&first, findings);
-}
-
-/// Asks until there is an answer, a few times.
-fn persist(port: &mut Port, unit: u8, interrupt: &Interrupt) -> Heard {
-    let mut worst = Heard::Silence;
-    for _ in 0..TRIES {
-        // Three registers: every family has those.
-        match ask_status(port, unit, 3, WAIT, interrupt) {
-            answer @ Heard::Answer(..) => return answer,
-            Heard::Silence => {}
-            other => worst = other,
-        }
+    match search(path, &first, interrupt) {
+        Outcome::Found(found) => elsewhere(path, found, findings, interrupt),
+        Outcome::Nobody(searched) => nobody(&first, &searched, findings),
+        Outcome::Interrupted => interrupted(findings),
     }
-    worst
 }
 
-fn other_baud(path: &Path, interrupt: &Interrupt) -> Option<u32> {
-    OTHER_BAUDS.into_iter().find(|baud| {
-        Port::open(path, *baud)
-            .is_ok_and(|mut port| matches!(persist(&mut port, UNIT, interrupt), Heard::Answer(..)))
-    })
-}
-
-/// Another unit at the usual speed. Where noise came there is no point in asking 247 of them.
-fn other_unit(path: &Path, first: &Heard, interrupt: &Interrupt) -> Option<u8> {
-    match first {
-        Heard::Other(unit) => return Some(*unit),
-        Heard::Silence | Heard::Echo => {}
-        Heard::Noise(_) | Heard::Exception(_) | Heard::Answer(..) => return None,
+/// Somebody answers, but not where a gripper does as delivered.
+fn elsewhere(path: &Path, found: Found, findings: &mut Findings, interrupt: &Interrupt) {
+    let Found { baud, unit } = found;
+    let (other_baud, other_unit) = (baud != BAUD, unit != UNIT);
+    let mut options = String::new();
+    if other_baud {
+        options.push_str(&format!(" --baud {baud}"));
     }
-    let mut port = Port::open(path, BAUD).ok()?;
-    (1..=247).filter(|unit| *unit != UNIT).find(|unit| {
-        let heard = ask_status(&mut port, *unit, 3, UNIT_WAIT, interrupt);
-        !interrupt.asked() && matches!(heard, Heard::Answer(..))
-    })
+    if other_unit {
+        options.push_str(&format!(" --unit {unit}"));
+    }
+    let next = format!(
+        "`gauntlet gripper …{options}`, or set unit {UNIT} and {BAUD} baud in the maker's tool"
+    );
+    if other_baud {
+        let what = format!("it answers at {baud} baud, not at {BAUD}");
+        findings.wrong("line", what, &next);
+    }
+    if other_unit {
+        let what = format!("unit {unit} answers at {baud} baud, not unit {UNIT}");
+        findings.wrong("unit", what, &next);
+    }
+    let settings = Settings {
+        baud: other_baud.then_some(baud),
+        unit: other_unit.then_some(unit),
+    };
+    reopen(path, settings, findings, interrupt);
 }
 
-fn nobody(first: &Heard, findings: &mut Findings) {
-    let tried = format!(
+fn nobody(first: &Heard, searched: &[u32], findings: &mut Findings) {
+    let mut tried = format!(
         "asked unit {UNIT} at {BAUD} and {} other speeds",
         OTHER_BAUDS.len()
     );
+    if !searched.is_empty() {
+        let speeds: Vec<String> = searched.iter().map(u32::to_string).collect();
+        tried.push_str(&format!(
+            ", then units 1 to 247 at {} baud",
+            speeds.join(", ")
+        ));
+    }
     match first {
         Heard::Noise(count) => findings.wrong(
             "line",
             format!("bytes come but no Modbus frame: {count} bytes at {BAUD} baud; {tried}"),
             "whether this is the gripper's port and not the glove's; RS-485 A against B, ground and termination",
         ),
-        Heard::Exception(code) => findings.wrong(
-            "unit",
-            format!("unit {UNIT} refuses a status read with exception {code:02X}"),
-            "whether this device is a Robotiq gripper",
-        ),
         Heard::Echo => findings.wrong(
             "line",
-            format!("only the adapter's own echo comes back; {tried}, and units 1 to 247"),
+            format!("only the adapter's own echo comes back; {tried}"),
             "the gripper's 24 V supply, and RS-485 A against B",
         ),
         _ => findings.wrong(
             "line",
-            format!("no byte comes; {tried}, and units 1 to 247 at {BAUD}"),
+            format!("no byte comes; {tried}"),
             "the gripper's 24 V supply, RS-485 A against B, and whether this is the gripper's port (`gauntlet ports`)",
         ),
     }

@@ -7,6 +7,8 @@ use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
+pub mod devices;
+
 use rustix::process::{Pid, Signal, kill_process};
 
 /// No command of these tests may take longer, on a busy machine too.

@@ -3,7 +3,7 @@
 use super::bno055::Bno055;
 use crate::{Duration, Instant};
 
-/// Address of the multiplexer.
+/// Address of the multiplexer with its pins low.
 const MUX: u8 = 0x70;
 /// Addresses of the even and the odd sensor of a channel.
 const SENSORS: [u8; 2] = [0x28, 0x29];
@@ -47,6 +47,7 @@ pub(super) struct Bus {
     /// Connected channels, one bit each.
     pub channels: u8,
     pub mux_unplugged: bool,
+    pub mux_address: u8,
     /// SDA or SCL stuck low: nothing ends by itself.
     pub dead: bool,
     pub transactions: u64,
@@ -62,6 +63,7 @@ impl Bus {
             sensors: core::array::from_fn(|index| Bno055::new(index, now)),
             channels: 0,
             mux_unplugged: false,
+            mux_address: MUX,
             dead: false,
             transactions: 0,
             nacks: 0,
@@ -123,7 +125,7 @@ impl Bus {
         if self.mux_unplugged {
             return false;
         }
-        if *address == MUX {
+        if *address == self.mux_address {
             message.run_mux(segment);
             return true;
         }

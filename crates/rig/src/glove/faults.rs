@@ -66,6 +66,11 @@ impl VirtualGlove {
         lock(&self.state).bus.mux_unplugged = unplugged;
     }
 
+    /// Sets the multiplexer's address pins: it answers at `address`, 0x70 to 0x77.
+    pub fn set_mux_address(&self, address: u8) {
+        lock(&self.state).bus.mux_address = address;
+    }
+
     /// Resets the multiplexer: no channel is connected.
     pub fn reset_mux(&self) {
         lock(&self.state).bus.channels = 0;

@@ -1,0 +1,193 @@
+//! A gripper that does not answer as delivered is looked for: at other speeds, under other unit numbers, at both.
+//!
+//! Only status reads go out. At a wrong speed some devices answer noise; then the speeds at which the line stays quiet are
+//! the likely ones, and only they are searched for other units.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use embedded_io::{Read, ReadReady, Write};
+use gripper::rtu::{Frame, Request, function};
+use gripper::timing;
+
+use super::raw::{Heard, ask_status};
+use crate::interrupt::Interrupt;
+use crate::port::{BAUD, Port};
+use crate::ports;
+use crate::progress::Progress;
+
+/// Unit as delivered.
+pub const UNIT: u8 = 9;
+/// Unit numbers a device can have.
+const UNITS: std::ops::RangeInclusive<u8> = 1..=247;
+/// Speeds a Robotiq gripper can be set to, the usual one left out.
+pub const OTHER_BAUDS: [u32; 5] = [57_600, 38_400, 19_200, 9_600, 230_400];
+/// Questions before silence is believed.
+pub const TRIES: usize = 3;
+/// For an answer: an adapter with a 16 ms latency timer, and a PC with other work.
+const WAIT: Duration = Duration::from_millis(80);
+/// From the end of a question to one of 247 units to the start of its answer; a later one is still heard, and asked again.
+const UNIT_WAIT: Duration = Duration::from_millis(10);
+/// The same behind an adapter that keeps bytes back.
+const UNIT_WAIT_SLOW: Duration = Duration::from_millis(40);
+/// Registers asked for: every family has those.
+const REGISTERS: u16 = 3;
+/// Bytes of the question and of its answer.
+const QUESTION: usize = 8;
+const ANSWER: usize = 5 + 2 * REGISTERS as usize;
+
+/// Where a gripper answers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Found {
+    /// At this speed.
+    pub baud: u32,
+    /// Under this unit number.
+    pub unit: u8,
+}
+
+/// What the search came to.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum Outcome {
+    /// Here it is.
+    Found(Found),
+    /// Nobody answered; these speeds were searched for other units.
+    Nobody(Vec<u32>),
+    /// Somebody asked for the end.
+    Interrupted,
+}
+
+/// Asks until there is an answer, a few times.
+pub fn persist(port: &mut Port, unit: u8, interrupt: &Interrupt) -> Heard {
+    let mut worst = Heard::Silence;
+    for _ in 0..TRIES {
+        match ask_status(port, unit, REGISTERS, WAIT, interrupt) {
+            answer @ Heard::Answer(..) => return answer,
+            Heard::Silence => {}
+            other => worst = other,
+        }
+    }
+    worst
+}
+
+/// Looks for whoever did not answer as unit 9 at 115200 baud, where `first` came instead.
+pub fn search(path: &Path, first: &Heard, interrupt: &Interrupt) -> Outcome {
+    let mut speeds = vec![(BAUD, first.clone())];
+    for baud in OTHER_BAUDS {
+        if let Ok(mut port) = Port::open(path, baud) {
+            speeds.push((baud, persist(&mut port, UNIT, interrupt)));
+        }
+    }
+    for (baud, heard) in &speeds {
+        match *heard {
+            Heard::Answer(..) => {
+                return Outcome::Found(Found {
+                    baud: *baud,
+                    unit: UNIT,
+                });
+            }
+            Heard::Other(unit) => return Outcome::Found(Found { baud: *baud, unit }),
+            _ => {}
+        }
+    }
+    let is_noise = |heard: &Heard| matches!(heard, Heard::Noise(_) | Heard::Exception(_));
+    let quiet: Vec<u32> = speeds
+        .iter()
+        .filter(|(_, heard)| !is_noise(heard))
+        .map(|(baud, _)| *baud)
+        .collect();
+    // Quiet among noisy ones: somebody understands what is said there. Worth asking twice.
+    let passes = if quiet.len() < speeds.len() { 2 } else { 1 };
+    units(path, &quiet, passes, interrupt)
+}
+
+fn units(path: &Path, bauds: &[u32], passes: u64, interrupt: &Interrupt) -> Outcome {
+    let slow = ports::latency_warning(path).is_some();
+    let each = u64::from(*UNITS.end());
+    let total = passes * each * bauds.len() as u64;
+    let mut progress = Progress::start("looking for the gripper", total, false);
+    for (round, &baud) in (0..passes).flat_map(|_| bauds).enumerate() {
+        let Ok(mut port) = Port::open(path, baud) else {
+            continue;
+        };
+        let mut heard = Vec::new();
+        for unit in UNITS.filter(|unit| *unit != UNIT) {
+            progress.at(round as u64 * each + u64::from(unit), || {
+                format!("unit {unit} at {baud} baud")
+            });
+            ask_unit(&mut port, unit, baud, slow, &mut heard, interrupt);
+            if interrupt.asked() {
+                return Outcome::Interrupted;
+            }
+            if let Some(unit) = answered(&heard)
+                && matches!(persist(&mut port, unit, interrupt), Heard::Answer(..))
+            {
+                return Outcome::Found(Found { baud, unit });
+            }
+        }
+    }
+    Outcome::Nobody(bauds.to_vec())
+}
+
+/// Asks one unit and adds what comes to `heard`, of which the newest part is kept: an answer may come late.
+fn ask_unit(
+    port: &mut Port,
+    unit: u8,
+    baud: u32,
+    slow: bool,
+    heard: &mut Vec<u8>,
+    interrupt: &Interrupt,
+) {
+    let request = Request::ReadHolding {
+        address: gripper::registers::STATUS,
+        quantity: REGISTERS,
+    };
+    let mut frame = [0; QUESTION];
+    if request.emit(unit, &mut frame).is_err() || port.write(&frame) != Ok(QUESTION) {
+        return;
+    }
+    let on_line = timing::characters(QUESTION + ANSWER, baud).as_micros();
+    let patience = if slow { UNIT_WAIT_SLOW } else { UNIT_WAIT };
+    let end = Instant::now() + Duration::from_micros(on_line) + patience;
+    heard.drain(..heard.len().saturating_sub(2 * (QUESTION + ANSWER)));
+    while Instant::now() < end && !interrupt.sleep(Duration::from_millis(1)) {
+        let mut chunk = [0; 64];
+        while port.read_ready() == Ok(true) && heard.len() < 512 {
+            match port.read(&mut chunk) {
+                Ok(count) if count > 0 => heard.extend_from_slice(&chunk[..count]),
+                _ => break,
+            }
+        }
+        if answered(heard).is_some() {
+            return;
+        }
+    }
+}
+
+/// The unit of the first answer among these bytes.
+fn answered(bytes: &[u8]) -> Option<u8> {
+    bytes.windows(ANSWER).find_map(|window| {
+        let frame = Frame::new_checked(window).ok()?;
+        let counted = frame.pdu().get(1) == Some(&(2 * REGISTERS as u8));
+        (frame.function() == function::READ_HOLDING && counted).then(|| frame.unit())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_is_found_among_echoes_and_noise() {
+        let mut answer = vec![12, 3, 6, 0x31, 0, 0, 1, 2, 3];
+        answer.extend(gripper::rtu::crc16(&answer).to_le_bytes());
+        assert_eq!(answered(&answer), Some(12));
+        let mut bytes = vec![0x55, 0xAA];
+        bytes.extend([12, 3, 0x07, 0xD0, 0, 3]);
+        bytes.extend(&answer);
+        bytes.extend([1, 2]);
+        assert_eq!(answered(&bytes), Some(12));
+        answer[4] ^= 1;
+        assert_eq!(answered(&answer), None);
+        assert_eq!(answered(&[]), None);
+    }
+}
