@@ -20,6 +20,18 @@ impl Address {
     /// # Errors
     /// A failure of usage: no host, or a port that is no number from 1 to 65535.
     pub fn parse(text: &Path) -> Result<Option<Self>, Failure> {
+        Self::with_ports_from(1, text)
+    }
+
+    /// The same for somebody who listens there: port 0 stands for any free one.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub fn parse_to_listen(text: &Path) -> Result<Option<Self>, Failure> {
+        Self::with_ports_from(0, text)
+    }
+
+    fn with_ports_from(lowest: u16, text: &Path) -> Result<Option<Self>, Failure> {
         let Some(text) = text.to_str().and_then(|text| text.strip_prefix("tcp:")) else {
             return Ok(None);
         };
@@ -41,7 +53,7 @@ impl Address {
             },
         };
         let port = port.map_or(Ok(PORT), |port| port.parse().map_err(|_| wrong()))?;
-        if host.is_empty() || port == 0 {
+        if host.is_empty() || port < lowest {
             return Err(wrong());
         }
         Ok(Some(Self {
@@ -79,6 +91,14 @@ mod tests {
         assert_eq!(parsed("tcp:[::1]"), host("::1", 502));
         assert_eq!(parsed("tcp:::1"), host("::1", 502));
         assert_eq!(parsed("/dev/ttyUSB0"), None);
+    }
+
+    #[test]
+    fn only_who_listens_may_leave_the_port_to_the_system() {
+        let text = Path::new("tcp:127.0.0.1:0");
+        assert!(Address::parse(text).is_err());
+        let any = Address::parse_to_listen(text).unwrap().unwrap();
+        assert_eq!((any.host.as_str(), any.port), ("127.0.0.1", 0));
     }
 
     #[test]

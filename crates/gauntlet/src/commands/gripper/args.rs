@@ -1,10 +1,10 @@
 //! The options of `gauntlet gripper`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
-use gripper::registers::three_finger;
+use gripper::registers::{three_finger, two_finger};
 
 use crate::line::Settings;
 
@@ -62,6 +62,26 @@ pub enum Model {
     HandE,
 }
 
+impl Model {
+    /// The maker's name for it.
+    pub fn name(self) -> &'static str {
+        match self.two_finger() {
+            Some(model) => model.name(),
+            None => "3-Finger gripper",
+        }
+    }
+
+    /// The 2-Finger or Hand-E model it is, if it is one.
+    pub fn two_finger(self) -> Option<two_finger::Model> {
+        match self {
+            Self::ThreeFinger => None,
+            Self::TwoFinger85 => Some(two_finger::Model::TwoFinger85),
+            Self::TwoFinger140 => Some(two_finger::Model::TwoFinger140),
+            Self::HandE => Some(two_finger::Model::HandE),
+        }
+    }
+}
+
 /// Where the gripper is and how to talk about it.
 #[derive(Debug, Clone, Args)]
 pub struct Target {
@@ -86,6 +106,18 @@ pub struct Target {
 }
 
 impl Target {
+    /// A gripper as delivered, at `place`.
+    pub fn delivered(place: &Path, model: Model) -> Self {
+        Self {
+            gripper: place.to_owned(),
+            model,
+            unit: None,
+            baud: None,
+            raw: false,
+            json: false,
+        }
+    }
+
     /// What differs from a gripper as delivered.
     pub fn settings(&self) -> Settings {
         Settings {

@@ -35,8 +35,10 @@ pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
     fn release(&mut self, closing: bool) -> bool;
     /// Another grasping mode; `false` where the family has none.
     fn set_mode(&mut self, mode: three_finger::Mode) -> bool;
-    /// Each axis by its own position, or all as the mode has it.
-    fn set_individual(&mut self, individual: bool);
+    /// Which axes follow their own positions; nothing for a family of one axis.
+    fn set_control(&mut self, control: Control);
+    /// Whether one position is the scissor's.
+    fn is_in_scissor_mode(&self) -> bool;
     /// The gripper's name and those of its axes.
     fn names(&self) -> (&'static str, [&'static str; X]);
     /// What only this family tells: name and value.
@@ -68,12 +70,11 @@ impl Bench<4> for ThreeFinger<Line> {
         ThreeFinger::set_mode(self, mode);
         true
     }
-    fn set_individual(&mut self, individual: bool) {
-        self.set_control(if individual {
-            Control::INDIVIDUAL
-        } else {
-            Control::SIMPLIFIED
-        });
+    fn set_control(&mut self, control: Control) {
+        ThreeFinger::set_control(self, control);
+    }
+    fn is_in_scissor_mode(&self) -> bool {
+        self.mode() == Some(three_finger::Mode::Scissor)
     }
     fn names(&self) -> (&'static str, [&'static str; 4]) {
         ("3-Finger gripper", crate::words::AXIS_WORDS)
@@ -126,7 +127,10 @@ impl Bench<1> for TwoFinger<Line> {
     fn set_mode(&mut self, _: three_finger::Mode) -> bool {
         false
     }
-    fn set_individual(&mut self, _: bool) {}
+    fn set_control(&mut self, _: Control) {}
+    fn is_in_scissor_mode(&self) -> bool {
+        false
+    }
     fn names(&self) -> (&'static str, [&'static str; 1]) {
         (self.model().name(), ["fingers"])
     }

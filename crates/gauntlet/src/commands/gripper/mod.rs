@@ -6,11 +6,12 @@ mod motion;
 mod table;
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::registers::{Severity, two_finger};
+use gripper::registers::Severity;
 use gripper::{Activation, Status};
 
 use crate::failure::Failure;
@@ -47,28 +48,60 @@ pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
     let target = options.verb.target();
     let is_tcp = crate::tcp::Address::parse(&target.gripper)?.is_some();
     if is_tcp && target.model != Model::ThreeFinger {
-        return Err(Failure::usage(
-            "only the 3-Finger gripper speaks Modbus TCP",
-            "a serial port, or --model 3f",
-        )
-        .into());
+        return Err(only_three_finger_on_tcp().into());
     }
     let line = Line::open(&target.gripper, target.settings(), interrupt)?;
     let config = line.driver_config(target.settings());
-    let model = match target.model {
-        Model::ThreeFinger => {
-            return act(ThreeFinger::new(line, config), config, options, interrupt);
-        }
-        Model::TwoFinger85 => two_finger::Model::TwoFinger85,
-        Model::TwoFinger140 => two_finger::Model::TwoFinger140,
-        Model::HandE => two_finger::Model::HandE,
-    };
-    act(
-        TwoFinger::new(line, model, config),
-        config,
-        options,
-        interrupt,
+    match target.model.two_finger() {
+        None => act(ThreeFinger::new(line, config), config, options, interrupt),
+        Some(model) => act(
+            TwoFinger::new(line, model, config),
+            config,
+            options,
+            interrupt,
+        ),
+    }
+}
+
+/// What to say to who wants another gripper on the network.
+pub(super) fn only_three_finger_on_tcp() -> Failure {
+    Failure::usage(
+        "only the 3-Finger gripper speaks Modbus TCP",
+        "a serial port, or the 3f model",
     )
+}
+
+/// Whether a gripper of this model answers at `place`; it is only read.
+///
+/// # Errors
+/// A failure that says why it does not.
+pub(super) fn probe(place: &Path, model: Model, interrupt: &Interrupt) -> Result<()> {
+    let target = &Target::delivered(place, model);
+    let line = Line::open(place, target.settings(), interrupt)?;
+    let config = line.driver_config(target.settings());
+    let waiter = &Waiter::new(interrupt);
+    match model.two_finger() {
+        None => {
+            let mut driver = ThreeFinger::new(line, config);
+            first_status(waiter, &mut driver, target, config).map(drop)
+        }
+        Some(two) => {
+            let mut driver = TwoFinger::new(line, two, config);
+            first_status(waiter, &mut driver, target, config).map(drop)
+        }
+    }
+}
+
+/// The first status; the driver tells why there is none.
+fn first_status<B: Bench<X>, const X: usize>(
+    waiter: &Waiter,
+    driver: &mut B,
+    target: &Target,
+    config: gripper::driver::Config,
+) -> Result<Status<X>> {
+    waiter
+        .status(driver)
+        .map_err(|last| no_answer(target, driver, config, last))
 }
 
 /// A verb under way.
@@ -87,10 +120,7 @@ fn act<B: Bench<X>, const X: usize>(
 ) -> Result<()> {
     let target = options.verb.target();
     let waiter = Waiter::new(interrupt);
-    let status = match waiter.status(&mut driver) {
-        Ok(status) => status,
-        Err(last) => return Err(no_answer(target, &mut driver, config, last)),
-    };
+    let status = first_status(&waiter, &mut driver, target, config)?;
     let tell = Tell::new(target.json);
     let mut doing = Doing {
         driver,

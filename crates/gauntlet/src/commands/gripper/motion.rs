@@ -1,9 +1,14 @@
 //! `gauntlet gripper move`: to a position, until it is there, holds something, or the time is over.
+//!
+//! No axis is ever told to be more than [`LEAD`] counts from where it is, and every cycle tells it anew: a cut wire, a
+//! killed program or a switched-off PC leaves the gripper at most that far from standing still.
 
 use std::ops::ControlFlow;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::supervisor::limits;
+use gripper::driver::Control;
 use gripper::registers::Severity;
 use gripper::{Activation, Contact, Motion, Status, space};
 
@@ -11,12 +16,72 @@ use super::bench::Bench;
 use super::{Doing, Move};
 use crate::failure::Failure;
 
+/// Most counts a command may be from the measured position.
+const LEAD: u8 = 40;
 /// The slowest full stroke takes 7 s; one that needs longer is stuck.
 const MOVE_WAIT: Duration = Duration::from_secs(15);
-/// For the hold after Ctrl-C.
+/// Without a status for this long the move is given up.
+const SILENCE: Duration = Duration::from_secs(1);
+/// For the hold after a move that did not end by itself: some fifty cycles.
 const HOLD_WAIT: Duration = Duration::from_millis(500);
 /// Statuses in a row that must say "standing" before the motion counts as over.
 const CALM: u32 = 3;
+
+/// Which axes the numbers on the command line are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Axes {
+    /// One number for each axis.
+    Each,
+    /// One number for all fingers; the scissor stays where the mode has it.
+    Fingers,
+    /// One number in scissor mode: the scissor's.
+    Scissor,
+}
+
+impl Axes {
+    fn control(self) -> Control {
+        match self {
+            Self::Each => Control::INDIVIDUAL,
+            Self::Fingers => Control {
+                fingers: true,
+                scissor: false,
+            },
+            Self::Scissor => Control::SIMPLIFIED,
+        }
+    }
+
+    /// Whether these numbers move axis `axis`.
+    fn moves(self, axis: usize) -> bool {
+        match self {
+            Self::Each => true,
+            Self::Fingers => axis != SCISSOR,
+            Self::Scissor => axis == SCISSOR,
+        }
+    }
+
+    /// A position for each axis as the command block carries it: in scissor mode the scissor's goes where finger A's is.
+    fn block<const X: usize>(self, mut position: [u8; X]) -> [u8; X] {
+        if self == Self::Scissor
+            && let Some(&scissor) = position.get(SCISSOR)
+        {
+            position[0] = scissor;
+        }
+        position
+    }
+}
+
+/// The scissor's place among four axes.
+const SCISSOR: usize = 3;
+
+/// How a move ended.
+enum End {
+    /// Every axis stands where it should, or touches something.
+    Stands,
+    /// The gripper says why it does not move.
+    Refused(Failure),
+    /// No status came for [`SILENCE`].
+    Silent,
+}
 
 /// Moves.
 ///
@@ -27,75 +92,139 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
     options: &Move,
     status: &Status<X>,
 ) -> Result<()> {
-    let position = positions::<X>(&options.to, doing.driver.names().0)?;
+    let target = positions::<X>(&options.to, doing.driver.names().0)?;
     may_move(status)?;
-    doing.driver.set_individual(options.to.len() == X);
-    let motion = Motion {
-        position,
-        speed: [options.speed; X],
-        force: [options.force; X],
+    let axes = match (options.to.len() == X, doing.driver.is_in_scissor_mode()) {
+        (true, _) => Axes::Each,
+        (false, false) => Axes::Fingers,
+        (false, true) => Axes::Scissor,
     };
+    doing.driver.set_control(axes.control());
     doing.tell.say(format_args!(
         "moving to {}, speed {}, force {}",
         words(&options.to),
         options.speed,
         options.force
     ));
-    let mut calm = 0;
     let mut newest = *status;
-    let waiter = doing.waiter.clone();
-    let ended = waiter.pump(&mut doing.driver, MOVE_WAIT, |driver, now, heard| {
-        driver.set_motion(Some(motion), now);
-        let Some(Ok(status)) = heard else {
-            return ControlFlow::Continue(());
-        };
-        newest = status;
-        if may_move(&status).is_err() {
-            return ControlFlow::Break(());
+    let ended = approach(doing, options, axes, target, &mut newest);
+    doing.driver.set_motion(None, doing.waiter.clock.now());
+    match ended {
+        Some(End::Stands) => Ok(()),
+        Some(End::Refused(failure)) => Err(failure.into()),
+        Some(End::Silent) => Err(unsure("the gripper stopped answering during the move").into()),
+        None => {
+            let interrupted = doing.waiter.interrupt.asked();
+            let why = if interrupted {
+                "interrupted".to_owned()
+            } else {
+                let seconds = MOVE_WAIT.as_secs();
+                format!("the gripper was not there {seconds} s after it was told to move")
+            };
+            Err(if !hold(doing, &newest, options, axes) {
+                unsure(&format!("{why}; the hold was not confirmed"))
+            } else if interrupted {
+                let what = "interrupted: the gripper is held where it is";
+                Failure::new(what, "`gauntlet gripper status`")
+            } else {
+                let what = format!("{why}; it is held where it is");
+                Failure::new(what, "`gauntlet doctor --gripper …`")
+            }
+            .into())
         }
-        let standing = driver.accepted() && !status.contact.contains(&Contact::Moving);
-        calm = if standing { calm + 1 } else { 0 };
-        if calm >= CALM {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    });
-    doing.driver.set_motion(None, waiter.clock.now());
-    may_move(&newest)?;
-    if ended.is_some() {
-        return Ok(());
     }
-    hold(doing, &newest, options);
-    Err(if waiter.interrupt.asked() {
-        Failure::new(
-            "interrupted: the gripper is held where it is",
-            "`gauntlet gripper status`",
-        )
-    } else {
-        Failure::new(
-            format!(
-                "the gripper was not there {} s after it was told to move; it is held where it is",
-                MOVE_WAIT.as_secs()
-            ),
-            "`gauntlet doctor --gripper …`",
-        )
-    }
-    .into())
 }
 
-/// Stays where it is: the Ctrl-C that led here must not cut this wait short, so it does not look at it.
-fn hold<B: Bench<X>, const X: usize>(doing: &mut Doing<'_, B>, status: &Status<X>, options: &Move) {
-    doing.driver.set_individual(true);
-    let motion = Motion {
-        position: status.hold(),
+/// Leads the gripper to `target`; `None` when the time is over or the end was asked for.
+fn approach<B: Bench<X>, const X: usize>(
+    doing: &mut Doing<'_, B>,
+    options: &Move,
+    axes: Axes,
+    target: [u8; X],
+    newest: &mut Status<X>,
+) -> Option<End> {
+    let waiter = doing.waiter.clone();
+    let (mut calm, mut heard_at) = (0, Instant::now());
+    let mut command = next_command(target, newest, axes);
+    waiter.pump(&mut doing.driver, MOVE_WAIT, |driver, now, heard| {
+        if let Some(Ok(status)) = heard {
+            (*newest, heard_at) = (status, Instant::now());
+            if let Err(failure) = may_move(&status) {
+                return ControlFlow::Break(End::Refused(failure));
+            }
+            let stands = |axis: usize| match status.contact[axis] {
+                Contact::Moving => false,
+                Contact::AtPosition => command[axis] == target[axis],
+                Contact::ContactOpening | Contact::ContactClosing => true,
+            };
+            let all = (0..X).filter(|axis| axes.moves(*axis)).all(stands);
+            calm = if driver.accepted() && all {
+                calm + 1
+            } else {
+                0
+            };
+            if calm >= CALM {
+                return ControlFlow::Break(End::Stands);
+            }
+            command = next_command(target, &status, axes);
+        } else if heard_at.elapsed() >= SILENCE {
+            return ControlFlow::Break(End::Silent);
+        }
+        driver.set_motion(Some(motion(axes.block(command), options)), now);
+        ControlFlow::Continue(())
+    })
+}
+
+/// The next position to ask for: towards `target`, at most [`LEAD`] from where each axis is, and such that no finger can
+/// meet the scissor on the way.
+fn next_command<const X: usize>(target: [u8; X], status: &Status<X>, axes: Axes) -> [u8; X] {
+    let wanted = core::array::from_fn(|axis| {
+        let here = status.position[axis];
+        if axes.moves(axis) {
+            target[axis].clamp(here.saturating_sub(LEAD), here.saturating_add(LEAD))
+        } else {
+            here
+        }
+    });
+    match axes {
+        Axes::Each => limits::keep_inside(wanted, &status.position, &target.map(f32::from)),
+        // The mode keeps fingers and scissor apart.
+        Axes::Fingers | Axes::Scissor => wanted,
+    }
+}
+
+fn motion<const X: usize>(position: [u8; X], options: &Move) -> Motion<X> {
+    Motion {
+        position,
         speed: [options.speed; X],
         force: [options.force; X],
-    };
+    }
+}
+
+/// Nobody can say what the gripper does; how far it may go is known.
+fn unsure(what: &str) -> Failure {
+    Failure::new(
+        what,
+        format!(
+            "look at the gripper: an axis comes to rest at most {LEAD} counts from where it was; in danger switch off its \
+             24 V supply; then `gauntlet doctor --gripper …`"
+        ),
+    )
+}
+
+/// Tells the gripper to stay where it is; whether it confirmed that. The Ctrl-C that led here must not cut this wait
+/// short, so it does not look at it.
+fn hold<B: Bench<X>, const X: usize>(
+    doing: &mut Doing<'_, B>,
+    status: &Status<X>,
+    options: &Move,
+    axes: Axes,
+) -> bool {
+    let motion = motion(axes.block(status.hold()), options);
     let written = doing.driver.counters().writes;
-    let end = std::time::Instant::now() + HOLD_WAIT;
+    let end = Instant::now() + HOLD_WAIT;
     let held = |driver: &B| driver.counters().writes != written && driver.accepted();
-    while std::time::Instant::now() < end && !held(&doing.driver) {
+    while Instant::now() < end && !held(&doing.driver) {
         let now = doing.waiter.clock.now();
         doing.driver.set_motion(Some(motion), now);
         // Whatever it says: the time is bounded, and there is nothing else to do.
@@ -103,6 +232,7 @@ fn hold<B: Bench<X>, const X: usize>(doing: &mut Doing<'_, B>, status: &Status<X
         std::thread::sleep(Duration::from_millis(1));
     }
     doing.driver.set_motion(None, doing.waiter.clock.now());
+    held(&doing.driver)
 }
 
 /// The numbers on the command line as one position an axis.
@@ -164,6 +294,54 @@ fn words(positions: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn status<const X: usize>(position: [u8; X]) -> Status<X> {
+        Status {
+            stamp: gripper::Instant::from_ticks(0),
+            activation: Activation::Ready,
+            going_to: true,
+            contact: [Contact::AtPosition; X],
+            echo: position,
+            position,
+            current: [0; X],
+            fault: gripper::Fault::None,
+        }
+    }
+
+    #[test]
+    fn no_command_is_more_than_forty_counts_from_where_an_axis_is() {
+        for here in 0..=255 {
+            for target in 0..=255 {
+                let [next] = next_command([target], &status([here]), Axes::Each);
+                assert!(next.abs_diff(here) <= LEAD);
+                assert!(next.abs_diff(target) <= here.abs_diff(target));
+                assert!(next != here || here == target);
+            }
+        }
+        let next = next_command([250; 4], &status([10, 20, 30, 137]), Axes::Fingers);
+        assert_eq!(next, [50, 60, 70, 137]);
+        let next = next_command([250; 4], &status([10, 20, 30, 137]), Axes::Scissor);
+        assert_eq!(Axes::Scissor.block(next), [177, 20, 30, 177]);
+    }
+
+    #[test]
+    fn a_way_that_ends_where_fingers_and_scissor_are_apart_never_leads_through_where_they_meet() {
+        // The scissor is closed and must open before the fingers may close.
+        let (mut here, target) = ([20, 20, 20, 230], [250, 250, 250, 100]);
+        for _ in 0..200 {
+            let next = next_command(target, &status(here), Axes::Each);
+            let corner = core::array::from_fn(|axis| next[axis].max(here[axis]));
+            assert!(space::contains_counts(&corner), "{here:?} {next:?}");
+            // The fingers are the faster ones.
+            for (axis, speed) in [9, 7, 8, 2].into_iter().enumerate() {
+                here[axis] = next[axis].clamp(
+                    here[axis].saturating_sub(speed),
+                    here[axis].saturating_add(speed),
+                );
+            }
+        }
+        assert_eq!(here, target);
+    }
 
     #[test]
     fn one_number_is_for_all_and_four_are_checked_for_interference() {
