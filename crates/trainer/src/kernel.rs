@@ -4,8 +4,7 @@
 //! belong to samples, *hidden lanes* (16 hidden units side by side, samples broadcast) where they belong to weights. Both add in
 //! the same order, so both see the same activations. Hidden units are padded to a multiple of 16 with zeros, which stay zero.
 
-pub(crate) mod backward;
-pub(crate) mod forward;
+pub(crate) mod affine;
 pub(crate) mod lanes;
 pub(crate) mod motion;
 pub(crate) mod nadam;
@@ -14,6 +13,7 @@ pub(crate) mod nearest;
 #[cfg(test)]
 mod tests;
 pub(crate) mod tracker;
+pub(crate) mod tree;
 
 use crate::data::Matrix;
 use crate::network::Network;
@@ -196,6 +196,11 @@ impl Blocks {
             }
         }
         blocks
+    }
+
+    /// The data from a block on; empty beyond the last.
+    pub(crate) fn from(&self, block: usize) -> &[f32] {
+        &self.data[(block * self.dims * LANES).min(self.data.len())..]
     }
 
     /// Number of blocks.

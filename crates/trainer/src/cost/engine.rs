@@ -12,15 +12,16 @@ mod tests;
 use super::reference::Autoencoder;
 use super::{Parts, Weights};
 use crate::data::Matrix;
-use crate::kernel::forward::products;
+use crate::kernel::affine::{Copies, Net};
 use crate::kernel::lanes::LANES;
 use crate::kernel::{Blocks, Machine, Shape, nadam};
 use crate::optimizer::{LearningRate, Nadam};
 use crate::pool::Pool;
-use cloud::{Cloud, PairPart, QPart, Ways, XPart, ranges};
+use cloud::{Cloud, PairPart, QPart, UnitPart, Ways, XPart, ranges};
 
-/// Parts of each cloud of samples.
+/// Parts of each cloud of samples, and the blocks from which on a part is cut in two.
 const PARTS: usize = 8;
+const LEAST_BLOCKS: usize = 8;
 
 /// Everything a training step needs.
 pub(crate) struct Engine {
@@ -32,16 +33,16 @@ pub(crate) struct Engine {
     /// Weights of f, then of g, flat.
     parameters: Vec<f32>,
     nadam: Nadam,
-    /// Unit-major copies of the weights, and the products of f's two layers.
-    units_f: Vec<f32>,
-    units_g: Vec<f32>,
-    products: Vec<f32>,
+    copies_f: Copies,
+    copies_g: Copies,
+    gradient: Vec<f32>,
     q: Cloud,
     /// The target samples, in one or more batches.
     batches: Vec<Cloud>,
     q_parts: Vec<QPart>,
     x_parts: Vec<XPart>,
     pair: PairPart,
+    unit_parts: Vec<UnitPart>,
     /// f(Q), the gradient by it, g(X of the batch), the gradient by it; in blocks.
     code: Vec<f32>,
     by_code: Vec<f32>,
@@ -70,30 +71,31 @@ impl Engine {
         g.flatten(&networks.g, &mut parameters[f.len()..]);
         let largest = batches.iter().map(|b| b.rows).max().unwrap_or(0);
         let q = Cloud::new(q);
-        let q_parts = ranges(q.blocks.blocks())
-            .map(|r| QPart::new(r, f, g, batches.len()))
-            .collect();
-        let x_parts = ranges(largest.div_ceil(LANES))
-            .map(|r| XPart::new(r, g, q.blocks.blocks() * f.outputs * LANES, batches.len()))
-            .collect();
+        let batches: Vec<Cloud> = batches.iter().map(Cloud::new).collect();
+        let q_parts = ranges(q.blocks.blocks()).into_iter();
+        let q_parts = q_parts.map(|r| QPart::new(r, &q, f, batches.len()));
+        let code = q.blocks.blocks() * f.outputs * LANES;
+        let x_parts = ranges(largest.div_ceil(LANES)).into_iter();
+        let x_parts = x_parts.map(|r| XPart::new(r, &batches, code));
         Self {
             machine: Machine::best(),
             pool: Pool::new(threads),
             nadam: Nadam::new(parameters.len()),
             parameters,
-            units_f: Vec::new(),
-            units_g: Vec::new(),
-            products: Vec::new(),
-            code: vec![0.0; q.blocks.blocks() * f.outputs * LANES],
-            by_code: vec![0.0; q.blocks.blocks() * f.outputs * LANES],
+            gradient: vec![0.0; f.len() + g.len()],
+            copies_f: Copies::default(),
+            copies_g: Copies::default(),
+            code: vec![0.0; code],
+            by_code: vec![0.0; code],
             image: vec![0.0; largest.div_ceil(LANES) * g.outputs * LANES],
             by_image: vec![0.0; largest.div_ceil(LANES) * g.outputs * LANES],
+            q_parts: q_parts.collect(),
+            x_parts: x_parts.collect(),
             q,
-            batches: batches.iter().map(Cloud::new).collect(),
-            q_parts,
-            x_parts,
-            pair: PairPart::new(f, g),
+            pair: PairPart::default(),
+            unit_parts: UnitPart::all([f.hidden, g.hidden]),
             ways: batches.iter().map(|_| Default::default()).collect(),
+            batches,
             f,
             g,
         }
@@ -137,32 +139,31 @@ impl Engine {
     pub(crate) fn step(&mut self, weights: &Weights, batch: usize, rate: &LearningRate) -> Parts {
         let parts = self.gradients(weights, batch);
         let factors = self.nadam.begin(rate);
-        self.update(factors.rate as f32, weights);
+        nadam::step(
+            self.machine,
+            factors.rate as f32,
+            &self.gradient,
+            &mut self.parameters,
+            &mut self.nadam.mean,
+            &mut self.nadam.square,
+        );
         parts
     }
 
     /// The parts of the cost and the gradient, without a step.
     pub(crate) fn evaluate(&mut self, weights: &Weights, batch: usize) -> (Parts, Autoencoder) {
         let parts = self.gradients(weights, batch);
-        let mut sum = vec![0.0; self.parameters.len()];
-        let (by_f, by_g) = sum.split_at_mut(self.f.len());
-        for (sum, partials) in [(by_f, self.partials_f()), (by_g, self.partials_g(weights))] {
-            for partial in partials {
-                for (sum, value) in sum.iter_mut().zip(partial) {
-                    *sum += value;
-                }
-            }
-        }
+        let (by_f, by_g) = self.gradient.split_at(self.f.len());
         let gradient = Autoencoder {
-            f: self.f.network(&sum[..self.f.len()]),
-            g: self.g.network(&sum[self.f.len()..]),
+            f: self.f.network(by_f),
+            g: self.g.network(by_g),
         };
         (parts, gradient)
     }
 
     /// f of the input samples, in blocks.
     pub(crate) fn codes(&mut self) -> Blocks {
-        self.prepare(false);
+        self.prepare();
         self.forward_all();
         Blocks {
             count: self.q.blocks.count,
@@ -171,31 +172,26 @@ impl Engine {
         }
     }
 
-    /// Copies of the weights in the order that the coming pass reads them.
-    fn prepare(&mut self, with_products: bool) {
+    /// Copies of the weights in the orders that the coming pass reads them.
+    fn prepare(&mut self) {
         let (f, g) = self.parameters.split_at(self.f.len());
-        self.f.unit_major(f, &mut self.units_f);
-        self.g.unit_major(g, &mut self.units_g);
-        if with_products {
-            products(self.f, &self.units_f, &mut self.products);
-        }
+        self.copies_f.take(self.machine, self.f, f);
+        self.copies_g.take(self.machine, self.g, g);
     }
 
-    /// The parts' gradients by f, in the order of summation.
-    fn partials_f(&self) -> Vec<&[f32]> {
-        let parts = self.q_parts.iter().map(|part| &part.by_f[..]);
-        parts.chain([&self.pair.by_f[..]]).collect()
-    }
-
-    /// The parts' gradients by g, in the order of summation.
-    fn partials_g(&self, weights: &Weights) -> Vec<&[f32]> {
-        let mut partials = vec![&self.pair.by_g[..]];
-        if weights.reconstruction != 0.0 {
-            partials.extend(self.q_parts.iter().map(|part| &part.by_g[..]));
-        }
-        if weights.attraction != 0.0 && weights.alpha != 0.0 {
-            partials.extend(self.x_parts.iter().map(|part| &part.by_g[..]));
-        }
-        partials
+    fn nets(&self) -> [Net<'_>; 2] {
+        let (f, g) = self.parameters.split_at(self.f.len());
+        [
+            Net {
+                shape: self.f,
+                flat: f,
+                copies: &self.copies_f,
+            },
+            Net {
+                shape: self.g,
+                flat: g,
+                copies: &self.copies_g,
+            },
+        ]
     }
 }

@@ -39,22 +39,6 @@ pub(crate) trait Lanes: Copy {
         // SAFETY: the caller's promise.
         unsafe { self.add(a.mul(b)) }
     }
-
-    /// The sum of the lanes by a halving tree (8, 4, 2, 1).
-    #[inline(always)]
-    unsafe fn sum(self) -> f32 {
-        let mut lanes = [0.0_f32; LANES];
-        // SAFETY: the array has 16 f32.
-        unsafe { self.store(lanes.as_mut_ptr()) };
-        let mut half = LANES / 2;
-        while half > 0 {
-            for l in 0..half {
-                lanes[l] += lanes[l + half];
-            }
-            half /= 2;
-        }
-        lanes[0]
-    }
 }
 
 /// Plain code, for any processor.

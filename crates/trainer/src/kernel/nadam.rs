@@ -1,15 +1,14 @@
-//! The sum of partial gradients in a fixed order, and Nadam's step.
+//! Nadam's step.
 
 use super::dispatch;
 use super::lanes::{LANES, Lanes};
 use crate::optimizer::{BETA1, BETA2, EPSILON};
 
 dispatch! {
-    /// gradient = Σ partials in their order; then one step of Nadam with this rate (learning rate times bias correction). All slices
-    /// have the same length, a multiple of 16.
+    /// One step of Nadam with this rate (learning rate times bias correction). All slices have the same length, a multiple of 16.
     pub(crate) fn step / step_kernel(
         rate: f32,
-        partials: &[&[f32]],
+        gradient: &[f32],
         parameters: &mut [f32],
         mean: &mut [f32],
         square: &mut [f32],
@@ -19,7 +18,7 @@ dispatch! {
 #[inline(always)]
 unsafe fn step_kernel<V: Lanes>(
     rate: f32,
-    partials: &[&[f32]],
+    gradient: &[f32],
     parameters: &mut [f32],
     mean: &mut [f32],
     square: &mut [f32],
@@ -27,17 +26,14 @@ unsafe fn step_kernel<V: Lanes>(
     let length = parameters.len();
     assert!(length.is_multiple_of(LANES));
     assert!(mean.len() == length && square.len() == length);
-    assert!(partials.iter().all(|partial| partial.len() == length));
+    assert!(gradient.len() == length);
     // SAFETY: the lengths were checked; features by the caller.
     unsafe {
         let (keep1, take1) = (V::splat(BETA1 as f32), V::splat((1.0 - BETA1) as f32));
         let (keep2, take2) = (V::splat(BETA2 as f32), V::splat((1.0 - BETA2) as f32));
         let (rate, epsilon) = (V::splat(rate), V::splat(EPSILON as f32));
         for at in (0..length).step_by(LANES) {
-            let mut g = V::splat(0.0);
-            for partial in partials {
-                g = g.add(V::load(partial.as_ptr().add(at)));
-            }
+            let g = V::load(gradient.as_ptr().add(at));
             let m = keep1.mul(V::load(mean.as_ptr().add(at))).add(take1.mul(g));
             let v = keep2
                 .mul(V::load(square.as_ptr().add(at)))

@@ -117,7 +117,6 @@ fn every_lane_operation_gives_the_same_bits_on_every_machine() {
                 x.choose(greater, y),
                 x.keep(V::mask(0x5a3c)),
                 x.mul_add(y, y),
-                V::splat(x.sum()),
                 V::splat(x.least()),
                 V::splat(f32::from(V::bits(greater))),
             ];

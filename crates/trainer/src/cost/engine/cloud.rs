@@ -1,10 +1,12 @@
 //! The parts that the samples are cut into, each with the room it works in.
 
-use super::PARTS;
+use super::{LEAST_BLOCKS, PARTS};
 use crate::data::Matrix;
+use crate::kernel::affine::Trace;
 use crate::kernel::lanes::LANES;
 use crate::kernel::motion::Motion;
 use crate::kernel::tracker::Tracker;
+use crate::kernel::tree::{Tree, halves};
 use crate::kernel::{Blocks, Shape};
 use core::ops::Range;
 
@@ -44,11 +46,8 @@ fn sort_by_place(rows: &Matrix, order: &mut [usize]) {
     let widest = (0..rows.cols).max_by(|a, b| width(a).total_cmp(&width(b)));
     let dim = widest.unwrap_or(0);
     order.sort_by(|&a, &b| rows.row(a)[dim].total_cmp(&rows.row(b)[dim]));
-    let half = (order.len() / 2).next_multiple_of(LANES).min(order.len());
-    if half == order.len() {
-        return;
-    }
-    let (left, right) = order.split_at_mut(half);
+    let [left, _] = halves(&(0..order.len().div_ceil(LANES)));
+    let (left, right) = order.split_at_mut(left.len() * LANES);
     sort_by_place(rows, left);
     sort_by_place(rows, right);
 }
@@ -107,26 +106,35 @@ fn memories(batches: usize) -> Vec<Memory> {
         .collect()
 }
 
-/// Cuts a number of blocks into at most [`PARTS`] ranges of nearly equal length.
-pub(super) fn ranges(blocks: usize) -> impl Iterator<Item = Range<usize>> {
-    let parts = blocks.clamp(1, PARTS);
-    (0..parts).map(move |part| part * blocks / parts..(part + 1) * blocks / parts)
+/// Cuts a number of blocks into at most [`PARTS`] ranges of nearly equal length, as [`sort_by_place`] cuts.
+pub(super) fn ranges(blocks: usize) -> Vec<Range<usize>> {
+    let whole = 0..blocks;
+    let mut ranges = vec![whole];
+    while ranges.len() < PARTS && ranges[0].len() > LEAST_BLOCKS {
+        ranges = ranges.iter().flat_map(halves).collect();
+    }
+    ranges
+}
+
+/// The samples of a range of blocks of a cloud of `count`.
+fn samples_in(blocks: &Range<usize>, count: usize) -> usize {
+    let end = (blocks.end * LANES).min(count);
+    end.saturating_sub(blocks.start * LANES)
 }
 
 /// A part of the input samples.
 pub(super) struct QPart {
     /// Its blocks.
     pub(super) blocks: Range<usize>,
-    /// Gradients by f and g.
-    pub(super) by_f: Vec<f32>,
-    pub(super) by_g: Vec<f32>,
-    /// Activations of one block.
-    pub(super) hidden: Vec<f32>,
+    /// Of its samples, and of their images by f.
+    pub(super) tree: Tree,
+    pub(super) code_tree: Tree,
+    /// What f does on the samples, g on their images.
+    pub(super) of_f: Trace,
+    pub(super) of_g: Trace,
     /// g(f(q)), then the scaled error.
     pub(super) reconstruction: Vec<f32>,
     pub(super) jacobian: Vec<f32>,
-    /// Partial sums of the gradient by the code.
-    pub(super) room: Vec<f32>,
     /// For each batch: f(q) among targets, q among g(x).
     pub(super) memory: Vec<Memory>,
     /// Sums (not means) of the terms over its samples.
@@ -143,15 +151,16 @@ pub(super) struct Sums {
 }
 
 impl QPart {
-    pub(super) fn new(blocks: Range<usize>, f: Shape, g: Shape, batches: usize) -> Self {
+    pub(super) fn new(blocks: Range<usize>, q: &Cloud, f: Shape, batches: usize) -> Self {
+        let count = samples_in(&blocks, q.blocks.count);
         Self {
+            tree: Tree::around(f.inputs, count, q.blocks.from(blocks.start)),
+            code_tree: Tree::new(f.outputs, count),
             blocks,
-            by_f: vec![0.0; f.len()],
-            by_g: vec![0.0; g.len()],
-            hidden: Vec::new(),
+            of_f: Trace::default(),
+            of_g: Trace::default(),
             reconstruction: Vec::new(),
             jacobian: Vec::new(),
-            room: Vec::new(),
             memory: memories(batches),
             sums: Sums::default(),
         }
@@ -162,10 +171,10 @@ impl QPart {
 pub(super) struct XPart {
     /// Its blocks, within the largest batch.
     pub(super) blocks: Range<usize>,
-    /// Gradient by g.
-    pub(super) by_g: Vec<f32>,
-    /// Activations of one block.
-    pub(super) hidden: Vec<f32>,
+    /// For each batch the tree of its samples.
+    pub(super) trees: Vec<Tree>,
+    /// What g does on them.
+    pub(super) of_g: Trace,
     /// For each batch: g(x) among inputs, x among f(q).
     pub(super) memory: Vec<Memory>,
     /// What its samples add to the gradient by f(Q), in blocks as f(Q).
@@ -174,12 +183,16 @@ pub(super) struct XPart {
 }
 
 impl XPart {
-    pub(super) fn new(blocks: Range<usize>, g: Shape, code: usize, batches: usize) -> Self {
+    pub(super) fn new(blocks: Range<usize>, batches: &[Cloud], code: usize) -> Self {
+        let tree = |x: &Cloud| {
+            let count = samples_in(&blocks, x.blocks.count);
+            Tree::around(x.blocks.dims, count, x.blocks.from(blocks.start))
+        };
         Self {
+            trees: batches.iter().map(tree).collect(),
             blocks,
-            by_g: vec![0.0; g.len()],
-            hidden: Vec::new(),
-            memory: memories(batches),
+            of_g: Trace::default(),
+            memory: memories(batches.len()),
             by_code: vec![0.0; code],
             sums: Sums::default(),
         }
@@ -187,32 +200,50 @@ impl XPart {
 }
 
 /// The reference pairs.
+#[derive(Default)]
 pub(super) struct PairPart {
     pub(super) q: Blocks,
     pub(super) x: Blocks,
-    pub(super) by_f: Vec<f32>,
-    pub(super) by_g: Vec<f32>,
-    pub(super) hidden: Vec<f32>,
+    pub(super) q_tree: Tree,
+    pub(super) x_tree: Tree,
+    pub(super) of_f: Trace,
+    pub(super) of_g: Trace,
     pub(super) output: Vec<f32>,
     /// Pin (Eq. 4), α inside.
     pub(super) cost: f64,
 }
 
 impl PairPart {
-    pub(super) fn new(f: Shape, g: Shape) -> Self {
-        Self {
-            q: Blocks::default(),
-            x: Blocks::default(),
-            by_f: vec![0.0; f.len()],
-            by_g: vec![0.0; g.len()],
-            hidden: Vec::new(),
-            output: Vec::new(),
-            cost: 0.0,
-        }
-    }
-
     pub(super) fn set(&mut self, q: &Matrix, x: &Matrix) {
         self.q = Blocks::from_matrix(q);
         self.x = Blocks::from_matrix(x);
+        self.q_tree = Tree::around(q.cols, q.rows, &self.q.data);
+        self.x_tree = Tree::around(x.cols, x.rows, &self.x.data);
+    }
+}
+
+/// Some units of f or of g, whose gradient is made from the parts' sums.
+pub(super) struct UnitPart {
+    pub(super) of_f: bool,
+    pub(super) units: Range<usize>,
+    /// Where each number goes, and the number.
+    pub(super) gradient: Vec<(u32, f32)>,
+}
+
+impl UnitPart {
+    /// All units of both networks, in pieces.
+    pub(super) fn all(hidden: [usize; 2]) -> Vec<Self> {
+        const PIECE: usize = 64;
+        let of = |(hidden, of_f): (usize, bool)| {
+            (0..hidden).step_by(PIECE).map(move |first| Self {
+                of_f,
+                units: first..(first + PIECE).min(hidden),
+                gradient: Vec::new(),
+            })
+        };
+        [(hidden[0], true), (hidden[1], false)]
+            .into_iter()
+            .flat_map(of)
+            .collect()
     }
 }

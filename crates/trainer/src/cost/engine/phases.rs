@@ -1,23 +1,21 @@
 //! The phases of a step: forward, nearest neighbours, backward, update. Within a phase the parts are independent.
 
+use super::cloud::UnitPart;
 use super::cloud::{Cloud, PairPart, QPart, Sums, Ways, XPart};
-use super::{Engine, Parts, Weights, nadam};
-use crate::kernel::backward::{Flow, backward, backward_through};
-use crate::kernel::forward::{forward, forward_jacobian};
+use super::{Engine, Parts, Weights};
+use crate::kernel::affine::backward::{Flow, Total, backward, by_samples, gradient};
+use crate::kernel::affine::forward::{Images, forward};
+use crate::kernel::affine::{Net, Trace};
 use crate::kernel::lanes::LANES;
-use crate::kernel::{Blocks, Machine, Shape};
+use crate::kernel::tree::Tree;
+use crate::kernel::{Blocks, Machine};
 use core::ops::Range;
 
 /// What all parts read.
 struct Shared<'a> {
     machine: Machine,
-    f: Shape,
-    g: Shape,
-    flat_f: &'a [f32],
-    flat_g: &'a [f32],
-    units_f: &'a [f32],
-    units_g: &'a [f32],
-    products: &'a [f32],
+    f: Net<'a>,
+    g: Net<'a>,
     q: &'a Cloud,
     x: &'a Cloud,
     weights: &'a Weights,
@@ -87,13 +85,14 @@ fn square_sum(values: &[f32]) -> f64 {
 impl Engine {
     /// Gradients into the parts' buffers.
     pub(super) fn gradients(&mut self, weights: &Weights, batch: usize) -> Parts {
-        self.prepare(weights.distortion != 0.0);
+        self.prepare();
         self.each_part(weights, batch, forward_piece);
         if weights.attraction != 0.0 {
             self.nearest_phase(weights, batch);
             self.merge(weights, batch);
         }
         self.each_part(weights, batch, backward_piece);
+        self.reduce(weights);
         self.collect(weights, batch)
     }
 
@@ -118,13 +117,16 @@ impl Engine {
         let (flat_f, flat_g) = self.parameters.split_at(self.f.len());
         let shared = Shared {
             machine: self.machine,
-            f: self.f,
-            g: self.g,
-            flat_f,
-            flat_g,
-            units_f: &self.units_f,
-            units_g: &self.units_g,
-            products: &self.products,
+            f: Net {
+                shape: self.f,
+                flat: flat_f,
+                copies: &self.copies_f,
+            },
+            g: Net {
+                shape: self.g,
+                flat: flat_g,
+                copies: &self.copies_g,
+            },
             q: &self.q,
             x: &self.batches[batch],
             weights,
@@ -192,32 +194,65 @@ impl Engine {
         }
     }
 
-    /// Adds the parts' gradients and does Nadam's step.
-    pub(super) fn update(&mut self, rate: f32, weights: &Weights) {
-        let mut parameters = core::mem::take(&mut self.parameters);
-        let mut state = core::mem::take(&mut self.nadam);
-        let split = self.f.len();
-        let machine = self.machine;
-        let (of_f, of_g) = (self.partials_f(), self.partials_g(weights));
-        let mut pieces = Vec::new();
-        let (p_f, p_g) = parameters.split_at_mut(split);
-        let (m_f, m_g) = state.mean.split_at_mut(split);
-        let (v_f, v_g) = state.square.split_at_mut(split);
-        for (partials, p, m, v) in [(&of_f, p_f, m_f, v_f), (&of_g, p_g, m_g, v_g)] {
-            let length = p.len().div_ceil(4).next_multiple_of(LANES);
-            let state = m.chunks_mut(length).zip(v.chunks_mut(length));
-            for (n, (p, (m, v))) in p.chunks_mut(length).zip(state).enumerate() {
-                let range = n * length..n * length + p.len();
-                pieces.push((partials, range, p, m, v));
+    /// The gradient from the parts' sums.
+    fn reduce(&mut self, weights: &Weights) {
+        let mut parts = core::mem::take(&mut self.unit_parts);
+        let mut sum = core::mem::take(&mut self.gradient);
+        let [f, g] = self.nets();
+        let count = self.q.blocks.count as f64;
+        let q_f: Vec<&[f32]> = self.q_parts.iter().map(|p| &p.of_f.sums[..]).collect();
+        let distorts = weights.distortion != 0.0;
+        let pins = self.pair.q.count > 0 && weights.pin != 0.0;
+        let mut plain_f: Vec<&[f32]> = Vec::new();
+        let mut plain_g: Vec<&[f32]> = Vec::new();
+        if pins {
+            plain_f.push(&self.pair.of_f.sums);
+        }
+        if !distorts {
+            plain_f.extend(&q_f);
+        }
+        if pins && weights.alpha != 0.0 {
+            plain_g.push(&self.pair.of_g.sums);
+        }
+        if weights.reconstruction != 0.0 {
+            plain_g.extend(self.q_parts.iter().map(|p| &p.of_g.sums[..]));
+        }
+        if weights.attraction != 0.0 && weights.alpha != 0.0 {
+            plain_g.extend(self.x_parts.iter().map(|p| &p.of_g.sums[..]));
+        }
+        let total_f = Total {
+            plain: &plain_f,
+            with_jacobian: if distorts { &q_f } else { &[] },
+            distortion: (weights.distortion / count) as f32,
+        };
+        let total_g = Total {
+            plain: &plain_g,
+            with_jacobian: &[],
+            distortion: 0.0,
+        };
+        self.pool.for_each(&mut parts, |part: &mut UnitPart| {
+            let (net, total) = if part.of_f {
+                (f, total_f)
+            } else {
+                (g, total_g)
+            };
+            let UnitPart {
+                units,
+                gradient: to,
+                ..
+            } = part;
+            to.clear();
+            gradient(net, total, units.clone(), &mut |at, value| {
+                to.push((at as u32, value));
+            });
+        });
+        for part in &parts {
+            let start = if part.of_f { 0 } else { self.f.len() };
+            for &(at, value) in &part.gradient {
+                sum[start + at as usize] = value;
             }
         }
-        self.pool
-            .for_each(&mut pieces, |(partials, range, p, m, v)| {
-                let partials: Vec<&[f32]> = partials.iter().map(|g| &g[range.clone()]).collect();
-                nadam::step(machine, rate, &partials, p, m, v);
-            });
-        self.parameters = parameters;
-        self.nadam = state;
+        (self.unit_parts, self.gradient) = (parts, sum);
     }
 }
 
@@ -230,11 +265,17 @@ fn forward_piece(shared: &Shared<'_>, piece: &mut Piece<'_>) {
         } => shared.forward_inputs(part, code, by_code),
         Piece::X { part, image, .. } => {
             let x = stretch(&shared.x.blocks, &part.blocks);
-            let image = &mut image[..x.len() / shared.g.inputs * shared.g.outputs];
-            let (units, hidden) = (shared.units_g, &mut part.hidden);
-            forward(shared.machine, shared.g, units, x, image, hidden);
+            let outputs = shared.g.shape.outputs;
+            let image = &mut image[..x.len() / shared.g.shape.inputs * outputs];
+            let images = Images {
+                input: x,
+                output: image,
+                jacobian: None,
+            };
+            let tree = &part.trees[shared.batch];
+            forward(shared.machine, shared.g, tree, images, &mut part.of_g);
             let motion = &mut part.memory[shared.batch].motion;
-            motion.look(shared.machine, shared.g.outputs, image, shared.forget[1]);
+            motion.look(shared.machine, outputs, image, shared.forget[1]);
         }
         Piece::Pair(part) => shared.pairs(part),
     }
@@ -243,36 +284,21 @@ fn forward_piece(shared: &Shared<'_>, piece: &mut Piece<'_>) {
 fn backward_piece(shared: &Shared<'_>, piece: &mut Piece<'_>) {
     match piece {
         Piece::Q { part, by_code, .. } => {
-            part.by_f.fill(0.0);
-            let count = shared.q.blocks.count as f64;
-            let factor = (shared.weights.distortion / count) as f32;
             let flow = Flow {
                 input: stretch(&shared.q.blocks, &part.blocks),
                 by_output: by_code,
-                jacobian: (factor != 0.0).then_some((&part.jacobian[..], factor)),
+                jacobian: (shared.weights.distortion != 0.0).then_some(&part.jacobian[..]),
             };
-            backward(
-                shared.machine,
-                shared.f,
-                shared.flat_f,
-                flow,
-                &mut part.by_f,
-            );
+            backward(shared.machine, shared.f, &part.tree, flow, &mut part.of_f);
         }
         Piece::X { part, by_image, .. } => {
-            part.by_g.fill(0.0);
             let flow = Flow {
                 input: stretch(&shared.x.blocks, &part.blocks),
                 by_output: by_image,
                 jacobian: None,
             };
-            backward(
-                shared.machine,
-                shared.g,
-                shared.flat_g,
-                flow,
-                &mut part.by_g,
-            );
+            let tree = &part.trees[shared.batch];
+            backward(shared.machine, shared.g, tree, flow, &mut part.of_g);
         }
         Piece::Pair(_) => {}
     }
@@ -281,19 +307,21 @@ fn backward_piece(shared: &Shared<'_>, piece: &mut Piece<'_>) {
 impl Shared<'_> {
     /// f, its Jacobian, and the whole reconstruction term (Eq. 2) of a part of Q.
     fn forward_inputs(&self, part: &mut QPart, code: &mut [f32], by_code: &mut [f32]) {
-        let (f, g, count) = (self.f, self.g, self.q.blocks.count);
+        let (f, g, count) = (self.f.shape, self.g.shape, self.q.blocks.count);
         let q = stretch(&self.q.blocks, &part.blocks);
         part.sums = Sums::default();
-        if self.weights.distortion == 0.0 {
-            forward(self.machine, f, self.units_f, q, code, &mut part.hidden);
-        } else {
-            let cells = f.inputs * f.outputs;
-            let (units, products) = (self.units_f, self.products);
-            let (jacobian, hidden) = (&mut part.jacobian, &mut part.hidden);
-            jacobian.resize(part.blocks.len() * cells * LANES, 0.0);
-            forward_jacobian(self.machine, f, units, products, q, code, jacobian, hidden);
-            clear_filling(jacobian, cells, &part.blocks, count);
-            part.sums.distortion = square_sum(jacobian);
+        let cells = f.inputs * f.outputs;
+        let distorts = self.weights.distortion != 0.0;
+        part.jacobian.resize(part.blocks.len() * cells * LANES, 0.0);
+        let images = Images {
+            input: q,
+            output: code,
+            jacobian: distorts.then_some(&mut part.jacobian[..]),
+        };
+        forward(self.machine, self.f, &part.tree, images, &mut part.of_f);
+        if distorts {
+            clear_filling(&mut part.jacobian, cells, &part.blocks, count);
+            part.sums.distortion = square_sum(&part.jacobian);
         }
         if self.weights.attraction != 0.0 {
             let motion = &mut part.memory[self.batch].motion;
@@ -305,67 +333,68 @@ impl Shared<'_> {
         }
         let error = &mut part.reconstruction;
         error.resize(q.len(), 0.0);
-        forward(self.machine, g, self.units_g, code, error, &mut part.hidden);
+        part.code_tree.fit(code);
+        let images = Images {
+            input: code,
+            output: error,
+            jacobian: None,
+        };
+        let tree = &part.code_tree;
+        forward(self.machine, self.g, tree, images, &mut part.of_g);
         error.iter_mut().zip(q).for_each(|(e, q)| *e -= q);
         clear_filling(error, g.outputs, &part.blocks, count);
         part.sums.reconstruction = 0.5 * square_sum(error);
         let c = (self.weights.reconstruction / count as f64) as f32;
         error.iter_mut().for_each(|e| *e *= c);
-        part.by_g.fill(0.0);
         let flow = Flow {
             input: code,
             by_output: error,
             jacobian: None,
         };
-        let (by_g, room) = (&mut part.by_g, &mut part.room);
-        backward_through(self.machine, g, self.flat_g, flow, by_g, by_code, room);
+        by_samples(self.machine, self.g, tree, flow, &part.of_g, by_code);
+        backward(self.machine, self.g, tree, flow, &mut part.of_g);
     }
 
     /// Pin (Eq. 4) and its gradient.
     fn pairs(&self, part: &mut PairPart) {
-        part.by_f.fill(0.0);
-        part.by_g.fill(0.0);
         part.cost = 0.0;
         if part.q.count == 0 || self.weights.pin == 0.0 {
             return;
         }
-        let pin = self.weights.pin;
-        part.cost += self.pin((self.f, self.units_f, self.flat_f), pin, part, true);
-        if self.weights.alpha != 0.0 {
-            let alpha = self.weights.alpha;
-            part.cost += alpha
-                * self.pin(
-                    (self.g, self.units_g, self.flat_g),
-                    pin * alpha,
-                    part,
-                    false,
-                );
+        let (pin, alpha) = (self.weights.pin, self.weights.alpha);
+        let PairPart {
+            q,
+            x,
+            q_tree,
+            x_tree,
+            of_f,
+            of_g,
+            output,
+            cost,
+        } = part;
+        *cost += self.pin(self.f, pin, (q, x), q_tree, of_f, output);
+        if alpha != 0.0 {
+            *cost += alpha * self.pin(self.g, pin * alpha, (x, q), x_tree, of_g, output);
         }
     }
 
     /// Mean of ‖net(from) − to‖² over the pairs, and `factor` times its gradient.
     fn pin(
         &self,
-        (shape, units, flat): (Shape, &[f32], &[f32]),
+        net: Net<'_>,
         factor: f64,
-        part: &mut PairPart,
-        of_f: bool,
+        (from, to): (&Blocks, &Blocks),
+        tree: &Tree,
+        trace: &mut Trace,
+        error: &mut Vec<f32>,
     ) -> f64 {
-        let (from, to, gradient) = if of_f {
-            (&part.q, &part.x, &mut part.by_f)
-        } else {
-            (&part.x, &part.q, &mut part.by_g)
-        };
-        let error = &mut part.output;
         error.resize(to.data.len(), 0.0);
-        forward(
-            self.machine,
-            shape,
-            units,
-            &from.data,
-            error,
-            &mut part.hidden,
-        );
+        let images = Images {
+            input: &from.data,
+            output: error,
+            jacobian: None,
+        };
+        forward(self.machine, net, tree, images, trace);
         error.iter_mut().zip(&to.data).for_each(|(e, x)| *e -= x);
         clear_filling(error, to.dims, &(0..to.blocks()), to.count);
         let mean = square_sum(error) / from.count as f64;
@@ -376,7 +405,7 @@ impl Shared<'_> {
             by_output: error,
             jacobian: None,
         };
-        backward(self.machine, shape, flat, flow, gradient);
+        backward(self.machine, net, tree, flow, trace);
         mean
     }
 }

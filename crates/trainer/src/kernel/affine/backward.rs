@@ -1,0 +1,448 @@
+//! Gradients by the weights and by the samples.
+
+use super::super::lanes::{LANES, Lanes};
+use super::super::tree::Tree;
+use super::super::{Machine, dispatch};
+use super::{Cut, Net, Trace, outer_product};
+
+/// Samples of a table's row, subsets of them, rows of a leaf's table.
+const GROUP: usize = 4;
+const SUBSETS: usize = 1 << GROUP;
+const GROUPS: usize = LANES / GROUP;
+/// Vectors of a sum that are looked up at once: their table fits the first-level cache.
+const CHUNK: usize = 4;
+
+/// What flows back into a network, in blocks; zero for the samples that fill up the last block.
+#[derive(Clone, Copy)]
+pub(crate) struct Flow<'a> {
+    /// The samples, \[block\]\[inputs\]\[16\].
+    pub(crate) input: &'a [f32],
+    /// The gradient by the outputs, \[block\]\[outputs\]\[16\].
+    pub(crate) by_output: &'a [f32],
+    /// Jacobians, \[block\]\[inputs\]\[outputs\]\[16\], if ‖J‖² is in the cost.
+    pub(crate) jacobian: Option<&'a [f32]>,
+}
+
+/// Sums into `trace.sums` what the gradient needs, after [`super::forward::forward`] on the same tree.
+pub(crate) fn backward(
+    machine: Machine,
+    net: Net<'_>,
+    tree: &Tree,
+    flow: Flow<'_>,
+    trace: &mut Trace,
+) {
+    check(net, tree, flow, trace);
+    let row = net.shape.sum_row(flow.jacobian.is_some());
+    trace.sums.clear();
+    trace.sums.resize((net.shape.hidden + 1) * row, 0.0);
+    trace.columns.resize(row * LANES, 0.0);
+    trace.rows.resize(row * LANES + LANES, 0.0);
+    trace.table.resize(row * GROUPS * SUBSETS, 0.0);
+    trace.totals.resize((tree.levels + 2) * row, 0.0);
+    sum(machine, net, tree, flow, trace);
+}
+
+fn check(net: Net<'_>, tree: &Tree, flow: Flow<'_>, trace: &Trace) {
+    let (shape, blocks) = (net.shape, tree.count.div_ceil(LANES));
+    net.check();
+    assert!(flow.input.len() >= blocks * shape.inputs * LANES);
+    assert!(flow.by_output.len() >= blocks * shape.outputs * LANES);
+    if let Some(jacobian) = flow.jacobian {
+        assert!(jacobian.len() >= blocks * shape.inputs * shape.outputs * LANES);
+    }
+    assert!(trace.ends.len() == tree.nodes.len());
+    assert!(trace.maps.len() >= blocks * shape.map_row());
+    assert!(
+        tree.nodes
+            .iter()
+            .all(|n| n.level < tree.levels && n.blocks.end <= blocks)
+    );
+}
+
+dispatch! {
+    fn sum / sum_kernel(net: Net<'_>, tree: &Tree, flow: Flow<'_>, trace: &mut Trace)
+}
+
+/// Children before parents: from the last node to the first.
+#[inline(always)]
+unsafe fn sum_kernel<V: Lanes>(net: Net<'_>, tree: &Tree, flow: Flow<'_>, trace: &mut Trace) {
+    let row = net.shape.sum_row(flow.jacobian.is_some());
+    let Trace {
+        active,
+        cuts,
+        ends,
+        sums,
+        columns,
+        rows,
+        table,
+        totals,
+        ..
+    } = trace;
+    // How many totals wait for their parents.
+    let mut waiting = 0;
+    let whole = net.shape.hidden * row;
+    for (n, node) in tree.nodes.iter().enumerate().rev() {
+        let [active_end, cuts_end] = ends[n];
+        let [first, first_cut] = if n == 0 { [0, 0] } else { ends[n - 1] };
+        // SAFETY: `backward` checked the lengths; no more than a level's totals wait, and units are below `hidden`.
+        unsafe {
+            if node.is_leaf() {
+                let total = totals.as_mut_ptr().add(waiting * row);
+                leaf_rows::<V>(net, flow, node.blocks.start, columns, rows);
+                leaf_table::<V>(row, rows, table, total);
+                look_up::<V>(row, &cuts[first_cut..cuts_end], table, sums);
+                waiting += 1;
+            } else {
+                waiting -= 1;
+                let right = totals.as_ptr().add((waiting - 1) * row);
+                add::<V>(row, totals.as_ptr().add(waiting * row), right.cast_mut());
+            }
+            let total = totals.as_ptr().add((waiting - 1) * row);
+            for &unit in &active[first..active_end] {
+                add::<V>(row, total, sums.as_mut_ptr().add(unit as usize * row));
+            }
+            if node.level == 0 {
+                add::<V>(row, total, sums.as_mut_ptr().add(whole));
+                waiting -= 1;
+            }
+        }
+    }
+}
+
+/// sum += term.
+#[inline(always)]
+unsafe fn add<V: Lanes>(row: usize, term: *const f32, sum: *mut f32) {
+    for at in (0..row).step_by(LANES) {
+        // SAFETY: the caller's promise.
+        unsafe {
+            let term = V::load(term.add(at));
+            V::load(sum.add(at)).add(term).store(sum.add(at));
+        }
+    }
+}
+
+/// rows\[sample\] = \[x; 1\]·(gradient by the output)ᵀ, then the Jacobian.
+#[inline(always)]
+unsafe fn leaf_rows<V: Lanes>(
+    net: Net<'_>,
+    flow: Flow<'_>,
+    block: usize,
+    columns: &mut [f32],
+    rows: &mut [f32],
+) {
+    let (inputs, outputs) = (net.shape.inputs, net.shape.outputs);
+    let (map, cells) = (net.shape.map(), inputs * outputs);
+    let row = net.shape.sum_row(flow.jacobian.is_some());
+    let x = &flow.input[block * inputs * LANES..][..inputs * LANES];
+    let e = &flow.by_output[block * outputs * LANES..][..outputs * LANES];
+    // SAFETY: `columns` has room for `row` vectors, `rows` for 16 rows and a vector more.
+    unsafe {
+        if outputs < LANES / 2 {
+            let mut to = columns.as_mut_ptr();
+            for i in 0..=inputs {
+                for e in e.chunks_exact(LANES) {
+                    let e = V::load(e.as_ptr());
+                    let product = if i == inputs {
+                        e
+                    } else {
+                        e.mul(V::load(x.as_ptr().add(i * LANES)))
+                    };
+                    product.store(to);
+                    to = to.add(LANES);
+                }
+            }
+            transpose(&columns[..map * LANES], row, rows);
+        } else {
+            let mut sample = vec![1.0; inputs + 1];
+            let mut by_output = vec![0.0; outputs + LANES];
+            for s in 0..LANES {
+                for (to, x) in sample.iter_mut().zip(x.chunks_exact(LANES)) {
+                    *to = x[s];
+                }
+                for (to, e) in by_output.iter_mut().zip(e.chunks_exact(LANES)) {
+                    *to = e[s];
+                }
+                let to = rows.as_mut_ptr().add(s * row);
+                outer_product::<V>(sample.as_ptr(), inputs + 1, by_output.as_ptr(), outputs, to);
+            }
+        }
+    }
+    if let Some(jacobian) = flow.jacobian {
+        let jacobian = &jacobian[block * cells * LANES..][..cells * LANES];
+        transpose(jacobian, row, &mut rows[map..]);
+    }
+}
+
+/// rows\[sample\]\[c\] = columns\[c\]\[sample\].
+#[inline(always)]
+fn transpose(columns: &[f32], row: usize, rows: &mut [f32]) {
+    for (c, column) in columns.chunks_exact(LANES).enumerate() {
+        for (s, &value) in column.iter().enumerate() {
+            rows[s * row + c] = value;
+        }
+    }
+}
+
+/// The sums of all subsets of each four samples, \[chunk\]\[group\]\[subset\]\[vectors of the chunk\], and of all 16.
+#[inline(always)]
+unsafe fn leaf_table<V: Lanes>(row: usize, rows: &[f32], table: &mut [f32], total: *mut f32) {
+    let vectors = row / LANES;
+    let mut table = table.as_mut_ptr();
+    for first in (0..vectors).step_by(CHUNK) {
+        let chunk = (vectors - first).min(CHUNK);
+        for v in 0..chunk {
+            // SAFETY: the table has GROUPS·SUBSETS rows.
+            unsafe {
+                let mut all = V::splat(0.0);
+                for group in 0..GROUPS {
+                    let at =
+                        |subset: usize| table.add(((group * SUBSETS + subset) * chunk + v) * LANES);
+                    let sample = |s: usize| {
+                        V::load(
+                            rows.as_ptr()
+                                .add((group * GROUP + s) * row + (first + v) * LANES),
+                        )
+                    };
+                    let [a, b, c, d] = [sample(0), sample(1), sample(2), sample(3)];
+                    let (ab, cd) = (a.add(b), c.add(d));
+                    V::splat(0.0).store(at(0));
+                    a.store(at(1));
+                    b.store(at(2));
+                    ab.store(at(3));
+                    c.store(at(4));
+                    a.add(c).store(at(5));
+                    b.add(c).store(at(6));
+                    ab.add(c).store(at(7));
+                    d.store(at(8));
+                    a.add(d).store(at(9));
+                    b.add(d).store(at(10));
+                    ab.add(d).store(at(11));
+                    cd.store(at(12));
+                    a.add(cd).store(at(13));
+                    b.add(cd).store(at(14));
+                    let four = ab.add(cd);
+                    four.store(at(15));
+                    all = all.add(four);
+                }
+                all.store(total.add((first + v) * LANES));
+            }
+        }
+        table = table.wrapping_add(GROUPS * SUBSETS * chunk * LANES);
+    }
+}
+
+/// Adds to each cut unit's sums those of the samples for which it is active.
+#[inline(always)]
+unsafe fn look_up<V: Lanes>(row: usize, cuts: &[Cut], table: &[f32], sums: &mut [f32]) {
+    let vectors = row / LANES;
+    let mut table = table.as_ptr();
+    for first in (0..vectors).step_by(CHUNK) {
+        let chunk = (vectors - first).min(CHUNK);
+        // SAFETY: the caller checked the lengths.
+        unsafe {
+            let sums = sums.as_mut_ptr().add(first * LANES);
+            match chunk {
+                1 => look_up_chunk::<V, 1>(row, cuts, table, sums),
+                2 => look_up_chunk::<V, 2>(row, cuts, table, sums),
+                3 => look_up_chunk::<V, 3>(row, cuts, table, sums),
+                _ => look_up_chunk::<V, CHUNK>(row, cuts, table, sums),
+            }
+        }
+        table = table.wrapping_add(GROUPS * SUBSETS * chunk * LANES);
+    }
+}
+
+#[inline(always)]
+unsafe fn look_up_chunk<V: Lanes, const N: usize>(
+    row: usize,
+    cuts: &[Cut],
+    table: *const f32,
+    sums: *mut f32,
+) {
+    for cut in cuts {
+        // SAFETY: the table has GROUPS·SUBSETS rows of N vectors, the sums a row for each unit.
+        unsafe {
+            let sums = sums.add(cut.unit as usize * row);
+            let rows: [*const f32; GROUPS] = core::array::from_fn(|group| {
+                let subset = cut.active as usize >> (group * GROUP) & (SUBSETS - 1);
+                table.add((group * SUBSETS + subset) * N * LANES)
+            });
+            for n in 0..N {
+                let [a, b, c, d] = rows.map(|row| V::load(row.add(n * LANES)));
+                let sum = sums.add(n * LANES);
+                V::load(sum).add(a.add(b).add(c.add(d))).store(sum);
+            }
+        }
+    }
+}
+
+/// The gradient by the samples, \[block\]\[inputs\]\[16\], after [`super::forward::forward`] on the same tree.
+pub(crate) fn by_samples(
+    machine: Machine,
+    net: Net<'_>,
+    tree: &Tree,
+    flow: Flow<'_>,
+    trace: &Trace,
+    by_input: &mut [f32],
+) {
+    check(net, tree, flow, trace);
+    assert!(by_input.len() >= tree.count.div_ceil(LANES) * net.shape.inputs * LANES);
+    through(machine, net, tree, flow, trace, by_input);
+}
+
+dispatch! {
+    fn through / through_kernel(
+        net: Net<'_>,
+        tree: &Tree,
+        flow: Flow<'_>,
+        trace: &Trace,
+        by_input: &mut [f32],
+    )
+}
+
+#[inline(always)]
+unsafe fn through_kernel<V: Lanes>(
+    net: Net<'_>,
+    tree: &Tree,
+    flow: Flow<'_>,
+    trace: &Trace,
+    by_input: &mut [f32],
+) {
+    let (inputs, outputs) = (net.shape.inputs, net.shape.outputs);
+    for (n, node) in tree.nodes.iter().enumerate().filter(|(_, n)| n.is_leaf()) {
+        let block = node.blocks.start;
+        let first_cut = if n == 0 { 0 } else { trace.ends[n - 1][1] };
+        // SAFETY: `by_samples` checked the lengths.
+        unsafe {
+            let e = flow.by_output.as_ptr().add(block * outputs * LANES);
+            let to = by_input.as_mut_ptr().add(block * inputs * LANES);
+            let map = trace.maps.as_ptr().add(block * net.shape.map_row());
+            for i in 0..inputs {
+                let mut sum = V::splat(0.0);
+                for k in 0..outputs {
+                    let slope = V::splat(*map.add(i * outputs + k));
+                    sum = sum.mul_add(slope, V::load(e.add(k * LANES)));
+                }
+                sum.store(to.add(i * LANES));
+            }
+            let cuts = &trace.cuts[first_cut..trace.ends[n][1]];
+            let mut four = cuts.chunks_exact(4);
+            for cuts in &mut four {
+                let cuts: [Cut; 4] = core::array::from_fn(|c| cuts[c]);
+                through_cuts::<V, 4>(net, cuts, e, to);
+            }
+            for &cut in four.remainder() {
+                through_cuts::<V, 1>(net, [cut], e, to);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+unsafe fn through_cuts<V: Lanes, const N: usize>(
+    net: Net<'_>,
+    cuts: [Cut; N],
+    e: *const f32,
+    by_input: *mut f32,
+) {
+    let shape = net.shape;
+    // SAFETY: the caller checked the lengths.
+    unsafe {
+        let units = net.copies.units.as_ptr();
+        let rows = cuts.map(|cut| units.add(cut.unit as usize * shape.unit()));
+        let mut back = [V::splat(0.0); N];
+        for k in 0..shape.outputs {
+            let e = V::load(e.add(k * LANES));
+            for (back, row) in back.iter_mut().zip(rows) {
+                *back = back.mul_add(V::splat(*row.add(shape.inputs + 1 + k)), e);
+            }
+        }
+        for (back, cut) in back.iter_mut().zip(cuts) {
+            *back = back.keep(V::mask(cut.active as u16));
+        }
+        for i in 0..shape.inputs {
+            let to = by_input.add(i * LANES);
+            let mut sum = V::load(to);
+            for (back, row) in back.iter().zip(rows) {
+                sum = sum.mul_add(V::splat(*row.add(i)), *back);
+            }
+            sum.store(to);
+        }
+    }
+}
+
+/// Sums of the traces of one network's parts, one after another, and how ‖J‖² counts.
+#[derive(Clone, Copy)]
+pub(crate) struct Total<'a> {
+    /// Sums without Jacobians, with Jacobians.
+    pub(crate) plain: &'a [&'a [f32]],
+    pub(crate) with_jacobian: &'a [&'a [f32]],
+    /// c of c·Σ‖J‖² in the cost.
+    pub(crate) distortion: f32,
+}
+
+/// The gradient by the weights of units `units` (and by b2, if the first is 0), flat, from the sums.
+pub(crate) fn gradient(
+    net: Net<'_>,
+    total: Total<'_>,
+    units: core::ops::Range<usize>,
+    put: &mut impl FnMut(usize, f32),
+) {
+    let shape = net.shape;
+    let (inputs, outputs, map) = (shape.inputs, shape.outputs, shape.map());
+    let mut sum = vec![0.0_f32; shape.sum_row(true)];
+    let gather = |row: usize, sum: &mut [f32]| {
+        sum.fill(0.0);
+        for (parts, with) in [(total.plain, false), (total.with_jacobian, true)] {
+            let width = shape.sum_row(with);
+            let used = map + if with { inputs * outputs } else { 0 };
+            for part in parts {
+                let part = &part[row * width..][..used];
+                sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
+            }
+        }
+    };
+    let mut by_w2 = vec![0.0_f32; outputs];
+    for j in units.clone() {
+        gather(j, &mut sum);
+        let unit = &net.copies.units[j * shape.unit()..(j + 1) * shape.unit()];
+        let (w1, w2) = unit.split_at(inputs + 1);
+        let c = 2.0 * total.distortion;
+        by_w2.fill(0.0);
+        for (i, w) in w1.iter().enumerate() {
+            let e = &sum[i * outputs..(i + 1) * outputs];
+            let mut by_w1 = dot(e, w2);
+            by_w2.iter_mut().zip(e).for_each(|(s, e)| *s += w * e);
+            if i < inputs && total.distortion != 0.0 {
+                let jacobian = &sum[map + i * outputs..map + (i + 1) * outputs];
+                by_w1 += c * dot(jacobian, w2);
+                let jacobian = by_w2.iter_mut().zip(jacobian);
+                jacobian.for_each(|(s, e)| *s += c * w * e);
+            }
+            put(i * shape.padded() + j, by_w1);
+        }
+        for (k, &by_w2) in by_w2.iter().enumerate() {
+            put(shape.w2() + k * shape.padded() + j, by_w2);
+        }
+    }
+    if units.start == 0 {
+        gather(shape.hidden, &mut sum);
+        for (k, &by_b2) in sum[inputs * outputs..map].iter().enumerate() {
+            put(shape.b2() + k, by_b2);
+        }
+    }
+}
+
+/// Σ a·b in eight sums.
+fn dot(a: &[f32], b: &[f32]) -> f32 {
+    let mut sums = [0.0_f32; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest = a8.remainder().iter().zip(b8.remainder());
+    let rest: f32 = rest.map(|(a, b)| a * b).sum();
+    for (a, b) in a8.zip(b8) {
+        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
+            *sum += a * b;
+        }
+    }
+    sums.iter().sum::<f32>() + rest
+}
