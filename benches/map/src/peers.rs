@@ -43,6 +43,7 @@ impl Nalgebra {
     }
 
     #[inline(never)]
+    #[expect(clippy::op_ref, reason = "the matrices would be copied")]
     pub fn eval(&self, q: &[f32; 25]) -> [f32; 4] {
         let h = (&*self.w1 * SVector::<f32, 25>::from_row_slice(q) + self.b1).map(|z| z.max(0.0));
         (&*self.w2 * h + self.b2).into()

@@ -66,7 +66,7 @@ impl Roof {
 
     /// Loads and multiplies all of `words`, which start at a multiple of 64 bytes.
     pub fn run(self, words: &[f32; WORDS], by: f32) {
-        assert!(words.as_ptr().addr() % 64 == 0);
+        assert!(words.as_ptr().addr().is_multiple_of(64));
         // SAFETY: the alignment was checked; `all` yields only widths that the machine has.
         unsafe {
             match (self.kernel, self.adds) {
@@ -123,7 +123,7 @@ macro_rules! roof {
             macro_rules! tiles {
                 ($streams:literal) => {{
                     let mut block = 0;
-                    while block + $streams <= BLOCKS {
+                    while $streams <= BLOCKS - block {
                         // SAFETY: the blocks are there.
                         unsafe { tile::<$streams, ADDS>(words, by, block) };
                         block += $streams;

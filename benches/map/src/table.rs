@@ -16,9 +16,12 @@ struct Contender<'a> {
     /// Evaluations in a round: about a third of a millisecond.
     times: usize,
     of: Kind,
-    run: Box<dyn FnMut(&[f32; 25]) + 'a>,
+    run: Run<'a>,
     nanoseconds: Vec<f64>,
 }
+
+/// One evaluation.
+type Run<'a> = Box<dyn FnMut(&[f32; 25]) + 'a>;
 
 /// What a contender is for.
 #[derive(Clone, Copy, Debug, PartialEq)]

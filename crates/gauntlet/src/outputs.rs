@@ -14,6 +14,8 @@ pub enum Kind {
     Model,
     /// A session log, MCAP.
     Log,
+    /// A weights image.
+    Image,
 }
 
 impl Kind {
@@ -21,6 +23,7 @@ impl Kind {
         match self {
             Self::Model => "a safetensors file",
             Self::Log => "an MCAP file",
+            Self::Image => "a weights image",
         }
     }
 
@@ -33,6 +36,7 @@ impl Kind {
                 *first == b'{' && u64::from_le_bytes(*header) < length
             }
             Self::Log => start.starts_with(b"\x89MCAP0\r\n"),
+            Self::Image => start.starts_with(&hae::image::MAGIC),
         }
     }
 }

@@ -21,6 +21,10 @@
 //! would turn a NaN into a plausible pose. An image whose weights could overflow a sum for inputs in range is refused
 //! when it is parsed, so an output is always finite.
 //!
+//! On a chip an image is checked, viewed and evaluated: that no panic can be reached from there is shown by linking
+//! (`qemu-count`). Making an image ([`image::encode`], [`quantized::encode`]) is a host's work and not in that check; it
+//! allocates nothing and refuses lengths that do not fit before it uses them.
+//!
 //! What this crate does not do: train, filter, decide. It does no I/O and reads no clock.
 #![no_std]
 #![deny(unsafe_code)]

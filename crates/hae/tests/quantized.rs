@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{Aligned, AlignedFloats, Network, meta, rng, vector};
+use common::{Aligned, AlignedFloats, Network, meta, reseal, rng, vector};
 use hae::image::{Element, Error, HEADER_LEN, parse};
 use hae::{Map, quantized};
 
@@ -94,22 +94,6 @@ fn every_flipped_bit_is_refused() {
         image[bit / 8] ^= 1 << (bit % 8);
     }
     assert!(parse(&image).is_ok());
-}
-
-/// Rewrites the CRC after a change, so that a later check is reached.
-fn reseal(bytes: &mut [u8]) {
-    let mut crc = 0xffff_ffffu32;
-    for (_, &byte) in bytes
-        .iter()
-        .enumerate()
-        .filter(|(at, _)| !(16..20).contains(at))
-    {
-        crc ^= u32::from(byte);
-        for _ in 0..8 {
-            crc = (crc >> 1) ^ (0xedb8_8320 & 0u32.wrapping_sub(crc & 1));
-        }
-    }
-    bytes[16..20].copy_from_slice(&(!crc).to_le_bytes());
 }
 
 #[test]

@@ -5,6 +5,7 @@ pub mod bench;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
+use hae::quantized;
 use rig::flash::{Nor, Power};
 
 /// A slot in rig's flash.
@@ -65,15 +66,10 @@ pub fn image(shape: [usize; 3], joint_order: JointOrder, version: u32, seed: u32
     encoded(shape, joint_order, version, [&w1, &b1, &w2, &b2])
 }
 
-fn encoded(
-    shape: [usize; 3],
-    joint_order: JointOrder,
-    version: u32,
-    weights: [&[f32]; 4],
-) -> Vec<u8> {
+fn parameters<'a>(shape: [usize; 3], weights: [&'a [f32]; 4]) -> Parameters<'a> {
     let [inputs, hidden, outputs] = shape;
     let [w1, b1, w2, b2] = weights;
-    let parameters = Parameters {
+    Parameters {
         inputs,
         hidden,
         outputs,
@@ -81,12 +77,26 @@ fn encoded(
         b1,
         w2,
         b2,
-    };
-    let meta = Meta {
+    }
+}
+
+fn meta(joint_order: JointOrder, version: u32) -> Meta {
+    Meta {
         model_id: 0xC0FFEE,
         version,
         joint_order,
-    };
+    }
+}
+
+fn encoded(
+    shape: [usize; 3],
+    joint_order: JointOrder,
+    version: u32,
+    weights: [&[f32]; 4],
+) -> Vec<u8> {
+    let [inputs, hidden, outputs] = shape;
+    let parameters = parameters(shape, weights);
+    let meta = meta(joint_order, version);
     let mut bytes = vec![0; encoded_len(inputs, hidden, outputs)];
     encode(&parameters, &meta, &mut bytes).expect("a sound image");
     bytes
@@ -95,25 +105,44 @@ fn encoded(
 /// A map of 25 angles by hand: thumb to finger A, index to B, ring to C, by the sum of each finger's three flexions (0 flat,
 /// `FIST` closed), and a scissor that stays at 130.
 pub fn hand_image(version: u32) -> Vec<u8> {
+    let [w1, b1, w2, b2] = hand_weights();
+    encoded(HAND, JointOrder::Hand25, version, [&w1, &b1, &w2, &b2])
+}
+
+/// The same map in 16-bit integers, calibrated on hands that close.
+pub fn hand_image_int16(version: u32) -> Vec<u8> {
+    let [w1, b1, w2, b2] = hand_weights();
+    let [inputs, hidden, outputs] = HAND;
+    let poses: Vec<f32> = (0..=20)
+        .flat_map(|step| FIST.map(|angle| angle * step as f32 / 20.0))
+        .collect();
+    let mut bytes = vec![0; quantized::encoded_len(inputs, hidden, outputs)];
+    quantized::encode(
+        &parameters(HAND, [&w1, &b1, &w2, &b2]),
+        &poses,
+        &meta(JointOrder::Hand25, version),
+        &mut bytes,
+    )
+    .expect("a sound image");
+    bytes
+}
+
+const HAND: [usize; 3] = [25, bridge::HIDDEN, 4];
+
+fn hand_weights() -> [Vec<f32>; 4] {
     const HIDDEN: usize = bridge::HIDDEN;
     let (mut w1, b1) = (vec![0.0; HIDDEN * 25], vec![0.0; HIDDEN]);
     let (mut w2, b2) = (vec![0.0; 4 * HIDDEN], vec![0.0, 0.0, 0.0, 130.0]);
     // Hidden unit k sums the flexions of one finger; relu leaves what is bent.
-    let fingers = [(0, [0, 3, 4]), (1, [5, 8, 9]), (3, [15, 18, 19])];
-    for (unit, (finger, joints)) in fingers.into_iter().enumerate() {
+    let fingers = [[0, 3, 4], [5, 8, 9], [15, 18, 19]];
+    for (unit, joints) in fingers.into_iter().enumerate() {
         let sum: f32 = joints.iter().map(|&joint: &usize| FIST[joint]).sum();
         for joint in joints {
             w1[unit * 25 + joint] = 1.0;
         }
-        let _ = finger;
         w2[unit * HIDDEN + unit] = 255.0 / sum;
     }
-    encoded(
-        [25, HIDDEN, 4],
-        JointOrder::Hand25,
-        version,
-        [&w1, &b1, &w2, &b2],
-    )
+    [w1, b1, w2, b2]
 }
 
 /// A fist.

@@ -1,20 +1,17 @@
 //! `gauntlet flash`: weights into a bridge on a chip.
 
-use std::path::Path;
-
 use anyhow::Result;
 use bridge::protocol::message::{SlotContents, Slots};
+use serde::Serialize;
 
 use crate::cli::Flash;
-use crate::failure::{Failure, OrFail, told};
+use crate::failure::Failure;
 use crate::host_link::{Flashed, HostLink};
 use crate::interrupt::Interrupt;
+use crate::model::{self, Int16};
+use crate::out;
 use crate::progress::Progress;
 use crate::tell::Tell;
-use crate::{model, out};
-
-/// Longest file that is looked at: a weights image has some 40 KB, a model some 500 KB.
-const LONGEST_FILE: u64 = 64 << 20;
 
 /// Writes the file's weights into the bridge.
 ///
@@ -22,16 +19,31 @@ const LONGEST_FILE: u64 = 64 << 20;
 /// A failure that names the file, the line, or what the bridge refuses.
 pub(super) fn run(options: &Flash, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
-    let image = image_of(&options.file)?;
+    let weights = model::weights(&options.file, options.int16.as_deref())?;
+    if let Some(int16) = &weights.int16 {
+        tell.say(format_args!("int16      {}", int16.line()));
+    }
     let mut link = HostLink::connect(&options.bridge).map_err(Failure::from)?;
-    let flashed = flash(&mut link, &image, &tell, interrupt)?;
+    let flashed = flash(&mut link, &weights.image, &tell, interrupt)?;
     if options.json {
-        return out::json(&flashed);
+        return out::json(&Told {
+            flashed: &flashed,
+            int16: weights.int16.as_ref(),
+        });
     }
     slot_lines(&flashed.slots)
         .iter()
         .for_each(|line| tell.say(format_args!("{line}")));
     Ok(())
+}
+
+/// The result as JSON.
+#[derive(Serialize)]
+struct Told<'a> {
+    #[serde(flatten)]
+    flashed: &'a Flashed,
+    /// `null` for an image in f32.
+    int16: Option<&'a Int16>,
 }
 
 /// Writes `image` with a progress bar, and says what became of it.
@@ -68,29 +80,6 @@ pub(super) fn flash(
         flashed.crc
     ));
     Ok(flashed)
-}
-
-/// The weights image in `path`, which is one or is a model.
-fn image_of(path: &Path) -> Result<Vec<u8>> {
-    let name = || format!("the file {}", path.display());
-    let length = std::fs::metadata(path)
-        .or_fail(name, "the path of a trained model or a weights image")?
-        .len();
-    if length > LONGEST_FILE {
-        return Err(Failure::new(
-            format!("{} has {length} bytes, far more than a map", path.display()),
-            "a model that `gauntlet train` made",
-        )
-        .into());
-    }
-    let bytes = std::fs::read(path).or_fail(name, "a file that you may read")?;
-    if !bytes.starts_with(&hae::image::MAGIC) {
-        return model::image(&model::load(path)?);
-    }
-    // The bridge checks it too; here it costs no minutes on the line.
-    hae::image::parse_exact(&bytes)
-        .map_err(|error| told(format!("{}: {error}", path.display())))?;
-    Ok(bytes)
 }
 
 /// What both slots hold, a line each.

@@ -4,6 +4,7 @@ mod bridge;
 mod demo;
 pub mod doctor;
 mod eval;
+pub mod export;
 mod flash;
 pub mod gripper;
 mod on_chip;
@@ -36,6 +37,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Eval(options) => eval::run(&options),
         Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
         Verb::Teleop(options) => teleop::run(&options, &interrupt()?),
+        Verb::Export(options) => export::run(&options),
         Verb::Flash(options) => flash::run(&options, &interrupt()?),
         Verb::Bridge(options) => bridge::run(&options, &interrupt()?),
         Verb::Ports(options) => ports::run(&options),

@@ -37,7 +37,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     if let Some(path) = &options.log {
         outputs::check(path, Kind::Log, &[&options.model])?;
     }
-    let image = model::image(&model::load(&options.model)?)?;
+    let image = model::weights(&options.model, None)?.image;
     let config = config(options.hand)?;
     for path in [&options.glove, &options.gripper] {
         if let Some(warning) = ports::latency_warning(path) {

@@ -28,7 +28,7 @@ impl Random {
             2 => f32::from_bits(self.next() & 0x807f_ffff), // zero or denormal
             3 => hae::INPUT_LIMIT,
             4 => -hae::INPUT_LIMIT,
-            5..16 => self.signed(6.28),
+            5..16 => self.signed(6.25),
             _ => self.signed(1.6),
         }
     }

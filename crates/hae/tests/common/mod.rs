@@ -1,6 +1,8 @@
 //! Seeded random networks and aligned buffers for the tests of this crate.
 #![allow(dead_code)] // every test file uses its part
 
+pub mod tiny;
+
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
@@ -158,4 +160,20 @@ impl core::ops::DerefMut for AlignedFloats {
     fn deref_mut(&mut self) -> &mut [f32] {
         &mut self.values[self.start..self.start + self.len]
     }
+}
+
+/// Rewrites the CRC after a change, so that a later check is reached.
+pub fn reseal(bytes: &mut [u8]) {
+    let mut crc = 0xffff_ffffu32;
+    for (_, &byte) in bytes
+        .iter()
+        .enumerate()
+        .filter(|(at, _)| !(16..20).contains(at))
+    {
+        crc ^= u32::from(byte);
+        for _ in 0..8 {
+            crc = (crc >> 1) ^ (0xedb8_8320 & 0u32.wrapping_sub(crc & 1));
+        }
+    }
+    bytes[16..20].copy_from_slice(&(!crc).to_le_bytes());
 }
