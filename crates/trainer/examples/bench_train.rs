@@ -145,12 +145,17 @@ fn schedule(word: &str) -> Result<Schedule> {
     })
 }
 
-/// Trains one model; the measures, and the seconds that it took.
-fn train(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result<(Measures, f64)> {
+/// Trains one model; the measures, and the seconds that it took: on the wall, of the processor.
+fn train(
+    name: &str,
+    schedule: Schedule,
+    seed: u64,
+    threads: usize,
+) -> Result<(Measures, [f64; 2])> {
     let mut domain = domain(name, seed)?;
     domain.settings.schedule = schedule;
     domain.settings.threads = threads;
-    let start = Instant::now();
+    let (start, before) = (Instant::now(), processor_seconds());
     let mut trainer = Trainer::new(&domain.train, &domain.targets, &domain.settings)?;
     let mut operator = InUnits {
         operator: domain.operator.as_mut(),
@@ -158,7 +163,10 @@ fn train(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result<(M
         target: &domain.units.1,
     };
     let trained = trainer.run(&mut operator, &mut |_| ControlFlow::Continue(()))?;
-    let seconds = start.elapsed().as_secs_f64();
+    let used = processor_seconds()
+        .zip(before)
+        .map(|(now, then)| now - then);
+    let seconds = [start.elapsed().as_secs_f64(), used.unwrap_or(f64::NAN)];
     let test = Test {
         inputs: &domain.test,
         targets: &domain.targets,
@@ -183,25 +191,29 @@ fn median(mut values: Vec<f64>) -> [f64; 3] {
 
 fn quality(name: &str, word: &str, seeds: u64, threads: usize) -> Result<()> {
     let schedule = schedule(word)?;
-    let mut rows: [Vec<f64>; 5] = Default::default();
+    let mut rows: [Vec<f64>; 6] = Default::default();
     for seed in 1..=seeds {
-        let (m, seconds) = train(name, schedule, seed, threads)?;
+        let (m, [wall, processor]) = train(name, schedule, seed, threads)?;
         let values = [
             m.distortion,
             m.occupancy.unwrap_or(f64::NAN),
             m.dissimilarity,
             m.nmse.unwrap_or(f64::NAN),
-            seconds,
+            wall,
+            processor,
         ];
         println!(
-            "{name} {word} seed {seed}: d {:.3} VO {:.3} dKnn {:.2} NMSE {:.3}  {:.2} s",
-            values[0], values[1], values[2], values[3], values[4]
+            "{name} {word} seed {seed}: d {:.3} VO {:.3} dKnn {:.2} NMSE {:.3}  {:.2} s, processor {:.2} s",
+            values[0], values[1], values[2], values[3], values[4], values[5]
         );
         for (row, value) in rows.iter_mut().zip(values) {
             row.push(value);
         }
     }
-    for (row, what) in rows.into_iter().zip(["d", "VO", "dKnn", "NMSE", "s"]) {
+    for (row, what) in rows
+        .into_iter()
+        .zip(["d", "VO", "dKnn", "NMSE", "s", "processor s"])
+    {
         let [low, middle, high] = median(row);
         print!("{what} {middle:.3} [{low:.3} {high:.3}]  ");
     }
@@ -271,8 +283,15 @@ fn processor_seconds() -> Option<f64> {
     Some(sum)
 }
 
-/// Milliseconds a step of 60, after 60 others: the processor's mean, the wall clock's least.
-fn time(size: &Size, weights: &Weights, threads: usize) -> (f64, f64) {
+/// Milliseconds a step: the processor's mean, the wall clock's least, and the least of each phase.
+struct Times {
+    processor: f64,
+    least: f64,
+    phases: [f64; Steps::PHASES.len()],
+}
+
+/// Of 60 steps after 60 others.
+fn time(size: &Size, weights: &Weights, threads: usize) -> Times {
     const STEPS: u32 = 60;
     let (networks, q, x, pairs) = task(size);
     let mut steps = Steps::new(&networks, (&q, &x), &pairs, threads);
@@ -280,19 +299,27 @@ fn time(size: &Size, weights: &Weights, threads: usize) -> (f64, f64) {
         steps.step(weights);
     }
     let before = processor_seconds();
-    let mut least = f64::INFINITY;
+    let (mut least, mut phases) = (f64::INFINITY, [f64::INFINITY; Steps::PHASES.len()]);
     for _ in 0..STEPS {
         let start = Instant::now();
         steps.step(weights);
         least = least.min(start.elapsed().as_secs_f64() * 1e3);
+        for (least, spent) in phases.iter_mut().zip(steps.spent()) {
+            *least = least.min(spent.as_secs_f64() * 1e3);
+        }
     }
     let used = processor_seconds()
         .zip(before)
         .map(|(after, before)| after - before);
-    (used.map_or(f64::NAN, |s| s * 1e3 / f64::from(STEPS)), least)
+    Times {
+        processor: used.map_or(f64::NAN, |s| s * 1e3 / f64::from(STEPS)),
+        least,
+        phases,
+    }
 }
 
-fn speed(threads: usize) {
+/// SP1's sizes, and the hand's.
+fn tasks() -> [(&'static str, Size); 2] {
     let sp1 = Size {
         q: 704,
         x: 8000,
@@ -306,76 +333,55 @@ fn speed(threads: usize) {
         dx: 4,
         ..sp1
     };
+    [("SP1", sp1), ("hand", hand)]
+}
+
+fn speed(threads: usize) {
     let full = Cost::Hae.weights(&Lambda::SHAPES);
-    println!(
-        "| task, {threads} threads | processor ms a step | least on the wall |\n|---|---|---|"
-    );
+    let phases = Steps::PHASES.join(" | ");
+    println!("| task, {threads} threads | processor ms a step | least on the wall | {phases} |");
+    println!("|---|---|---|{}", "---|".repeat(Steps::PHASES.len()));
     let row = |name: &str, size: &Size, weights: &Weights| {
-        let (processor, least) = time(size, weights, threads);
-        println!("| {name} | {processor:.2} | {least:.2} |");
+        let times = time(size, weights, threads);
+        print!("| {name} | {:.2} | {:.2} |", times.processor, times.least);
+        times.phases.iter().for_each(|ms| print!(" {ms:.3} |"));
+        println!();
     };
-    for (name, size) in [("SP1", &sp1), ("hand", &hand)] {
-        row(&format!("{name}, everything"), size, &full);
-        let without = [
-            (
-                "attraction",
-                Weights {
-                    attraction: 0.0,
-                    ..full
-                },
-            ),
-            ("what α adds", Weights { alpha: 0.0, ..full }),
-            (
-                "distortion",
-                Weights {
-                    distortion: 0.0,
-                    ..full
-                },
-            ),
-            (
-                "reconstruction",
-                Weights {
-                    reconstruction: 0.0,
-                    ..full
-                },
-            ),
-        ];
-        for (term, weights) in without {
-            row(&format!("{name} without {term}"), size, &weights);
+    for (name, size) in tasks() {
+        row(&format!("{name}, everything"), &size, &full);
+        let without = |change: fn(&mut Weights)| {
+            let mut weights = full;
+            change(&mut weights);
+            weights
+        };
+        for (term, weights) in [
+            ("attraction", without(|w| w.attraction = 0.0)),
+            ("what α adds", without(|w| w.alpha = 0.0)),
+            ("distortion", without(|w| w.distortion = 0.0)),
+            ("reconstruction", without(|w| w.reconstruction = 0.0)),
+        ] {
+            row(&format!("{name} without {term}"), &size, &weights);
         }
         for factor in [2, 4] {
-            row(
-                &format!("{name}, N_Q × {factor}"),
-                &Size {
-                    q: size.q * factor,
-                    ..*size
-                },
-                &full,
-            );
-            row(
-                &format!("{name}, N_X × {factor}"),
-                &Size {
-                    x: size.x * factor,
-                    ..*size
-                },
-                &full,
-            );
-            let wide = Size {
-                hidden: size.hidden * factor,
-                ..*size
-            };
-            row(&format!("{name}, H × {factor}"), &wide, &full);
-            row(
-                &format!("{name}, D_Q × {factor}"),
-                &Size {
-                    dq: size.dq * factor,
-                    ..*size
-                },
-                &full,
-            );
+            for (what, grow) in GROWTHS {
+                let mut grown = size;
+                *grow(&mut grown) *= factor;
+                row(&format!("{name}, {what} × {factor}"), &grown, &full);
+            }
         }
     }
 }
+
+/// A size by its name.
+type Growth = (&'static str, fn(&mut Size) -> &mut usize);
+
+/// Along what a step's time is measured.
+const GROWTHS: [Growth; 4] = [
+    ("N_Q", |size| &mut size.q),
+    ("N_X", |size| &mut size.x),
+    ("H", |size| &mut size.hidden),
+    ("D_Q", |size| &mut size.dq),
+];
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();

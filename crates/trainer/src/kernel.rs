@@ -5,6 +5,7 @@
 //! the same order, so both see the same activations. Hidden units are padded to a multiple of 16 with zeros, which stay zero.
 
 pub(crate) mod affine;
+pub(crate) mod boxes;
 pub(crate) mod lanes;
 pub(crate) mod motion;
 pub(crate) mod nadam;

@@ -18,10 +18,22 @@ use crate::kernel::{Blocks, Machine, Shape, nadam};
 use crate::optimizer::{LearningRate, Nadam};
 use crate::pool::Pool;
 use cloud::{Cloud, PairPart, QPart, UnitPart, Ways, XPart, ranges};
+use core::time::Duration;
+use std::time::Instant;
 
 /// Parts of each cloud of samples, and the blocks from which on a part is cut in two.
 const PARTS: usize = 8;
 const LEAST_BLOCKS: usize = 8;
+
+/// The phases of a step; within each the parts are worked on in parallel.
+pub(crate) const PHASES: [&str; 6] = [
+    "copies of the weights",
+    "forward",
+    "neighbours",
+    "backward",
+    "gradient from sums",
+    "Nadam",
+];
 
 /// Everything a training step needs.
 pub(crate) struct Engine {
@@ -36,6 +48,8 @@ pub(crate) struct Engine {
     copies_f: Copies,
     copies_g: Copies,
     gradient: Vec<f32>,
+    /// How long each phase of the newest step took.
+    spent: [Duration; PHASES.len()],
     q: Cloud,
     /// The target samples, in one or more batches.
     batches: Vec<Cloud>,
@@ -83,6 +97,7 @@ impl Engine {
             nadam: Nadam::new(parameters.len()),
             parameters,
             gradient: vec![0.0; f.len() + g.len()],
+            spent: Default::default(),
             copies_f: Copies::default(),
             copies_g: Copies::default(),
             code: vec![0.0; code],
@@ -114,6 +129,11 @@ impl Engine {
         }
     }
 
+    /// How long each of [`PHASES`] of the newest step took.
+    pub(crate) fn spent(&self) -> [Duration; PHASES.len()] {
+        self.spent
+    }
+
     /// Nadam's state.
     pub(crate) fn nadam(&self) -> &Nadam {
         &self.nadam
@@ -138,6 +158,7 @@ impl Engine {
     /// One step on one batch of targets; the parts of the cost are those before the step.
     pub(crate) fn step(&mut self, weights: &Weights, batch: usize, rate: &LearningRate) -> Parts {
         let parts = self.gradients(weights, batch);
+        let start = Instant::now();
         let factors = self.nadam.begin(rate);
         nadam::step(
             self.machine,
@@ -147,6 +168,7 @@ impl Engine {
             &mut self.nadam.mean,
             &mut self.nadam.square,
         );
+        self.spent[5] = start.elapsed();
         parts
     }
 

@@ -1,11 +1,12 @@
 //! The fast f32 cost and gradient, for those who want a single evaluation or bare steps (tests, measurements). Training uses the same
 //! code.
 
-use super::engine::Engine;
+use super::engine::{Engine, PHASES};
 use super::reference::Autoencoder;
 use super::{Parts, Weights};
 use crate::data::{Matrix, Pairs};
 use crate::optimizer::LearningRate;
+use core::time::Duration;
 
 /// As [`super::reference::evaluate`], in f32 on the kernels of this machine with `threads` threads.
 ///
@@ -38,6 +39,15 @@ impl Steps {
         let mut engine = Engine::new(networks, q, core::slice::from_ref(x), threads);
         engine.set_pairs(&pairs.inputs, &pairs.targets);
         Self(engine)
+    }
+
+    /// The phases of a step.
+    pub const PHASES: [&str; 6] = PHASES;
+
+    /// How long each of [`Self::PHASES`] of the newest step took.
+    #[must_use]
+    pub fn spent(&self) -> [Duration; 6] {
+        self.0.spent()
     }
 
     /// One step of Nadam; the parts of the cost before it.

@@ -20,6 +20,8 @@ pub(crate) trait Lanes: Copy {
     unsafe fn mul(self, other: Self) -> Self;
     unsafe fn div(self, other: Self) -> Self;
     unsafe fn sqrt(self) -> Self;
+    /// Lane by lane `self` if it is greater, else `other`.
+    unsafe fn max(self, other: Self) -> Self;
     /// Lane by lane `self > other`.
     unsafe fn gt(self, other: Self) -> Self::Mask;
     /// `self` where the mask is set, +0 elsewhere.
@@ -91,6 +93,10 @@ impl Lanes for Plain {
     #[inline(always)]
     unsafe fn sqrt(self) -> Self {
         Self(self.0.map(libm::sqrtf))
+    }
+    #[inline(always)]
+    unsafe fn max(self, other: Self) -> Self {
+        self.zip(other, |a, b| if a > b { a } else { b })
     }
     #[inline(always)]
     unsafe fn gt(self, other: Self) -> u16 {
@@ -183,6 +189,10 @@ mod x86 {
             Self(unsafe { _mm512_sqrt_ps(self.0) })
         }
         #[inline(always)]
+        unsafe fn max(self, other: Self) -> Self {
+            Self(unsafe { _mm512_max_ps(self.0, other.0) })
+        }
+        #[inline(always)]
         unsafe fn gt(self, other: Self) -> __mmask16 {
             unsafe { _mm512_cmp_ps_mask::<_CMP_GT_OQ>(self.0, other.0) }
         }
@@ -251,6 +261,10 @@ mod x86 {
         #[inline(always)]
         unsafe fn sqrt(self) -> Self {
             unsafe { Self(_mm256_sqrt_ps(self.0), _mm256_sqrt_ps(self.1)) }
+        }
+        #[inline(always)]
+        unsafe fn max(self, o: Self) -> Self {
+            unsafe { Self(_mm256_max_ps(self.0, o.0), _mm256_max_ps(self.1, o.1)) }
         }
         #[inline(always)]
         unsafe fn gt(self, o: Self) -> Self::Mask {

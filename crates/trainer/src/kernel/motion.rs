@@ -1,5 +1,6 @@
 //! How far the points of a moving cloud have come, so that bounds on distances stay bounds.
 
+use super::boxes::MOST_DIMS;
 use super::dispatch;
 use super::lanes::{LANES, Lanes};
 
@@ -16,6 +17,8 @@ pub(crate) struct Motion {
     pub(crate) point: Vec<f32>,
     /// Sum of each block's longest moves.
     pub(crate) block: Vec<f32>,
+    /// \[block\]\[dims\]\[low, high\] of the points now, if there are few dimensions.
+    pub(crate) sides: Vec<f32>,
     /// The longest move between the last two looks.
     pub(crate) longest: f32,
 }
@@ -35,6 +38,8 @@ impl Motion {
             self.block.clear();
             self.block.resize(blocks, 0.0);
         }
+        let sides = if dims > MOST_DIMS { 0 } else { 2 * dims };
+        self.sides.resize(blocks * sides, 0.0);
         self.longest = moves(
             machine,
             dims,
@@ -42,6 +47,7 @@ impl Motion {
             &mut self.last,
             &mut self.point,
             &mut self.block,
+            &mut self.sides,
         );
     }
 }
@@ -53,6 +59,7 @@ dispatch! {
         last: &mut [f32],
         point: &mut [f32],
         block: &mut [f32],
+        sides: &mut [f32],
     ) -> f32
 }
 
@@ -63,6 +70,7 @@ unsafe fn moves_kernel<V: Lanes>(
     last: &mut [f32],
     point: &mut [f32],
     block: &mut [f32],
+    sides: &mut [f32],
 ) -> f32 {
     assert!(now.len() == last.len() && now.len() == block.len() * dims * LANES);
     assert!(point.len() == block.len() * LANES);
@@ -70,17 +78,21 @@ unsafe fn moves_kernel<V: Lanes>(
     for (b, block) in block.iter_mut().enumerate() {
         // SAFETY: the lengths were checked; features by the caller.
         unsafe {
-            let mut square = V::splat(0.0);
+            let (zero, mut square) = (V::splat(0.0), V::splat(0.0));
             for i in b * dims..(b + 1) * dims {
                 let here = V::load(now.as_ptr().add(i * LANES));
                 let d = here.sub(V::load(last.as_ptr().add(i * LANES)));
                 square = square.mul_add(d, d);
                 here.store(last.as_mut_ptr().add(i * LANES));
+                if let Some(side) = sides.get_mut(2 * i..2 * (i + 1)) {
+                    side[0] = here.least();
+                    side[1] = -zero.sub(here).least();
+                }
             }
             let way = V::splat(MORE).mul_add(square.sqrt(), V::splat(1.0 + SHARE));
             let at = point.as_mut_ptr().add(b * LANES);
             V::load(at).add(way).store(at);
-            let most = -V::splat(0.0).sub(way).least();
+            let most = -zero.sub(way).least();
             *block += most;
             longest = longest.max(most);
         }

@@ -1,3 +1,4 @@
+use super::boxes::Boxes;
 use super::lanes::LANES;
 use super::motion::Motion;
 use super::nearest::nearest;
@@ -56,8 +57,10 @@ fn walk(machine: Machine, dims: usize, (queries, candidates): (usize, usize), qu
         } else {
             block_ways[..motion.block.len()].copy_from_slice(&motion.block);
         }
+        let boxes = Boxes::around(dims, &candidates.data);
         let field = Field {
             dims,
+            boxes: &boxes,
             candidates: &candidates.data,
             count: candidates.count,
             block_ways: &block_ways,
@@ -113,6 +116,7 @@ fn every_lane_operation_gives_the_same_bits_on_every_machine() {
                 x.mul(y),
                 x.div(y),
                 x.mul(x).sqrt(),
+                x.max(y),
                 x.keep(greater),
                 x.choose(greater, y),
                 x.keep(V::mask(0x5a3c)),

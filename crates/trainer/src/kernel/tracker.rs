@@ -1,9 +1,11 @@
 //! Exact nearest neighbours of points that move a little from step to step.
 //!
-//! For each query and each block of 16 candidates a lower bound on their distance is kept, and lowered by the ways that both have
-//! come ([`super::motion`]); only blocks whose bound is below the best distance found are looked at again. Before that, one
-//! comparison with the bound of the second nearest settles most queries. The result is that of [`super::nearest`], bit for bit.
+//! For each query a lower bound on the distance of all candidates but the nearest is kept, and lowered by the ways that both have come
+//! ([`super::motion`]): one comparison settles most queries. For the others the blocks of 16 candidates are searched whose boxes are
+//! near enough ([`super::boxes`]); in many dimensions, where boxes say nothing, a bound is kept for each query and block.
+//! The result is that of [`super::nearest`], bit for bit.
 
+use super::boxes::Boxes;
 use super::dispatch;
 use super::lanes::{LANES, Lanes};
 use super::motion::{MORE, SHARE};
@@ -18,7 +20,7 @@ pub(crate) struct Tracker {
     pub(crate) nearest: Vec<u32>,
     /// For each query a bound on the distance of all other candidates, ways of the time added.
     second: Vec<f32>,
-    /// \[query\]\[block\], blocks padded to 16: bounds, ways of the time added.
+    /// \[query\]\[block\], blocks padded to 16: bounds, ways of the time added; empty where there are boxes.
     bounds: Vec<f32>,
     /// Which generation of ways the bounds belong to.
     generation: u64,
@@ -32,6 +34,8 @@ pub(crate) struct Field<'a> {
     pub(crate) candidates: &'a [f32],
     /// Candidates without the filling.
     pub(crate) count: usize,
+    /// Boxes around the blocks; empty in many dimensions.
+    pub(crate) boxes: &'a Boxes,
     /// Ways of the candidate blocks, padded to 16 (zero for fixed candidates), and the sum of the longest moves.
     pub(crate) block_ways: &'a [f32],
     pub(crate) total_way: f32,
@@ -52,7 +56,11 @@ impl Tracker {
         count: usize,
         field: &Field<'_>,
     ) {
-        let padded = field.block_ways.len();
+        let padded = if field.boxes.is_empty() {
+            field.block_ways.len()
+        } else {
+            0
+        };
         if self.nearest.len() != count
             || self.bounds.len() != count * padded
             || self.generation != field.generation
@@ -81,6 +89,7 @@ unsafe fn follow_kernel<V: Lanes>(tracker: &mut Tracker, queries: &[f32], field:
     assert!(queries.len() >= count.div_ceil(LANES) * field.dims * LANES);
     assert!(field.candidates.len() >= blocks * field.dims * LANES);
     assert!(field.block_ways.len() == blocks.next_multiple_of(LANES));
+    assert!(field.boxes.is_empty() || field.boxes.fit(field.dims, blocks));
     assert!(field.query_ways.len() >= count.next_multiple_of(LANES));
     assert!(tracker.nearest.iter().all(|&n| (n as usize) < field.count));
     // SAFETY: the lengths were checked; features by the caller.
@@ -109,7 +118,11 @@ unsafe fn all<V: Lanes, const D: usize>(tracker: &mut Tracker, queries: &[f32], 
             while unsettled != 0 {
                 let lane = unsettled.trailing_zeros() as usize;
                 unsettled &= unsettled - 1;
-                search::<V>(tracker, here.add(lane), dims, field, first + lane);
+                if field.boxes.is_empty() {
+                    search::<V>(tracker, here.add(lane), dims, field, first + lane);
+                } else {
+                    search_boxes::<V>(tracker, here.add(lane), dims, field, first + lane);
+                }
             }
         }
     }
@@ -154,6 +167,59 @@ struct Best {
     square: f32,
     index: u32,
     other: f32,
+}
+
+/// Finds the nearest candidate of one query among the boxes near it, and renews the bound of the second nearest.
+#[inline(always)]
+unsafe fn search_boxes<V: Lanes>(
+    tracker: &mut Tracker,
+    query: *const f32,
+    dims: usize,
+    field: &Field<'_>,
+    n: usize,
+) {
+    let mut best = Best {
+        square: f32::INFINITY,
+        index: 0,
+        other: f32::INFINITY,
+    };
+    let home = tracker.nearest[n] as usize / LANES;
+    let mut unseen = f32::INFINITY;
+    // SAFETY: the caller checked the lengths.
+    unsafe {
+        look_at::<V>(&mut best, query, dims, field, home);
+        let infinite = V::splat(f32::INFINITY);
+        for row in 0..field.boxes.outer_rows() {
+            let bound = field.boxes.outer::<V>(query, dims, row);
+            let mut near = !V::bits(bound.gt(V::splat(reach(&best, field))));
+            unseen = unseen.min(infinite.choose(V::mask(near), bound).least());
+            while near != 0 {
+                let group = row * LANES + near.trailing_zeros() as usize;
+                near &= near - 1;
+                let bound = field.boxes.inner::<V>(query, dims, group);
+                let mut near = !V::bits(bound.gt(V::splat(reach(&best, field))));
+                unseen = unseen.min(infinite.choose(V::mask(near), bound).least());
+                if home / LANES == group {
+                    near &= !(1 << (home % LANES));
+                }
+                while near != 0 {
+                    let block = group * LANES + near.trailing_zeros() as usize;
+                    near &= near - 1;
+                    look_at::<V>(&mut best, query, dims, field, block);
+                }
+            }
+        }
+    }
+    tracker.nearest[n] = best.index;
+    let second = libm::sqrtf(best.other.min(unseen)) * (1.0 - SHARE);
+    tracker.second[n] = second + (field.total_way + field.query_ways[n]);
+}
+
+/// Boxes within this squared distance are looked into: the best so far, and what would come near it soon.
+#[inline(always)]
+fn reach(best: &Best, field: &Field<'_>) -> f32 {
+    let far = libm::sqrtf(best.square) * (1.0 + SHARE) + MORE + AHEAD * field.longest;
+    far * far
 }
 
 /// Finds the nearest candidate of one query, and renews its bounds.

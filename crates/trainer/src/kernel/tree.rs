@@ -1,10 +1,8 @@
 //! Nested ranges of blocks of samples, each with a box around its samples.
 
+use super::boxes::MOST_DIMS;
 use super::lanes::LANES;
 use core::ops::Range;
-
-/// From so many dimensions on boxes say nothing: hardly a unit has one sign in a box.
-const MOST_DIMS: usize = 8;
 
 /// Half widths are made larger by this share of the coordinates, more than all rounding in a pre-activation.
 const MARGIN: f32 = 4e-6;

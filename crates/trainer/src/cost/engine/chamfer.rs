@@ -16,9 +16,15 @@ impl Engine {
     /// Both directions of both Chamfer distances, and the gradient by the moving points that belong to the part.
     pub(super) fn nearest_phase(&mut self, weights: &Weights, batch: usize) {
         let [code_ways, image_ways] = &mut self.ways[batch];
-        code_ways.gather(self.q_parts.iter().map(|part| &part.memory[batch].motion));
+        code_ways.gather(
+            self.f.outputs,
+            self.q_parts.iter().map(|part| &part.memory[batch].motion),
+        );
         if weights.alpha != 0.0 {
-            image_ways.gather(self.x_parts.iter().map(|part| &part.memory[batch].motion));
+            image_ways.gather(
+                self.g.outputs,
+                self.x_parts.iter().map(|part| &part.memory[batch].motion),
+            );
         }
         let x = &self.batches[batch];
         let near = Near {
@@ -112,6 +118,7 @@ fn among_fixed<'a>(still: &'a [f32], fixed: &'a Cloud, own: &'a [f32], ways: &Wa
         dims: fixed.blocks.dims,
         candidates: &fixed.blocks.data,
         count: fixed.blocks.count,
+        boxes: &fixed.boxes,
         block_ways: &still[..fixed.blocks.blocks().next_multiple_of(LANES)],
         total_way: 0.0,
         query_ways: own,
@@ -132,6 +139,7 @@ impl Near<'_> {
             dims,
             candidates: moving,
             count,
+            boxes: &ways.boxes,
             block_ways: &ways.block[..count.div_ceil(LANES).next_multiple_of(LANES)],
             total_way: ways.total,
             query_ways: self.still,

@@ -3,6 +3,7 @@
 use super::{LEAST_BLOCKS, PARTS};
 use crate::data::Matrix;
 use crate::kernel::affine::Trace;
+use crate::kernel::boxes::{Boxes, MOST_DIMS};
 use crate::kernel::lanes::LANES;
 use crate::kernel::motion::Motion;
 use crate::kernel::tracker::Tracker;
@@ -14,6 +15,8 @@ use core::ops::Range;
 pub(super) struct Cloud {
     pub(super) blocks: Blocks,
     pub(super) rows: Matrix,
+    /// Around its blocks.
+    pub(super) boxes: Boxes,
     /// Ways of samples and blocks that stand still.
     pub(super) still: Vec<f32>,
 }
@@ -23,8 +26,10 @@ impl Cloud {
         let mut order: Vec<usize> = (0..rows.rows).collect();
         sort_by_place(rows, &mut order);
         let rows = rows.select(&order);
+        let blocks = Blocks::from_matrix(&rows);
         Self {
-            blocks: Blocks::from_matrix(&rows),
+            boxes: Boxes::around(blocks.dims, &blocks.data),
+            blocks,
             still: vec![0.0; rows.rows.next_multiple_of(LANES)],
             rows,
         }
@@ -63,6 +68,8 @@ pub(super) struct Ways {
     pub(super) longest: f32,
     /// How often ways were forgotten.
     pub(super) generation: u64,
+    /// Around its blocks as they are now.
+    pub(super) boxes: Boxes,
 }
 
 impl Ways {
@@ -72,7 +79,15 @@ impl Ways {
     }
 
     /// Gathers, after all parts have looked.
-    pub(super) fn gather<'a>(&mut self, parts: impl Iterator<Item = &'a Motion>) {
+    pub(super) fn gather<'a>(
+        &mut self,
+        dims: usize,
+        parts: impl Iterator<Item = &'a Motion> + Clone,
+    ) {
+        if dims <= MOST_DIMS {
+            let sides = parts.clone().map(|motion| &motion.sides[..]);
+            self.boxes.gather(dims, sides);
+        }
         if self.forget() {
             self.total = 0.0;
             self.generation += 1;

@@ -10,6 +10,7 @@ use crate::kernel::lanes::LANES;
 use crate::kernel::tree::Tree;
 use crate::kernel::{Blocks, Machine};
 use core::ops::Range;
+use std::time::Instant;
 
 /// What all parts read.
 struct Shared<'a> {
@@ -85,14 +86,21 @@ fn square_sum(values: &[f32]) -> f64 {
 impl Engine {
     /// Gradients into the parts' buffers.
     pub(super) fn gradients(&mut self, weights: &Weights, batch: usize) -> Parts {
+        let mut last = Instant::now();
+        let mut lap = || core::mem::replace(&mut last, Instant::now()).elapsed();
         self.prepare();
+        self.spent[0] = lap();
         self.each_part(weights, batch, forward_piece);
+        self.spent[1] = lap();
         if weights.attraction != 0.0 {
             self.nearest_phase(weights, batch);
             self.merge(weights, batch);
         }
+        self.spent[2] = lap();
         self.each_part(weights, batch, backward_piece);
+        self.spent[3] = lap();
         self.reduce(weights);
+        self.spent[4] = lap();
         self.collect(weights, batch)
     }
 
