@@ -57,17 +57,22 @@ fn python(package: &str, folder: &Path) -> Option<PathBuf> {
     installed.then_some(python)
 }
 
-fn python_peer(package: &str) {
+fn python_peer(package: &str, place: Option<&str>) {
     let folder = tempfile::tempdir().unwrap();
     let Some(python) = python(package, folder.path()) else {
         println!("skipped: {package} is not there and cannot be installed");
         return;
     };
-    let mut simulation = Simulation::start(false, true);
+    let mut simulation = Simulation::with(false, Some(place.unwrap_or("gripper")), &[]);
     let script = Path::new(env!("CARGO_MANIFEST_DIR"))
         .join("tests/peers")
         .join(format!("{package}_client.py"));
-    let said = output(Command::new(python).arg(script).arg(simulation.gripper())).unwrap();
+    let said = output(
+        Command::new(python)
+            .arg(script)
+            .arg(simulation.gripper_place()),
+    )
+    .unwrap();
     println!("{}", text(&said.stdout).trim());
     assert!(said.status.success(), "{}", text(&said.stderr));
     assert_eq!(simulation.end(), Some(0));
@@ -75,12 +80,17 @@ fn python_peer(package: &str) {
 
 #[test]
 fn pymodbus_reads_activates_and_moves() {
-    python_peer("pymodbus");
+    python_peer("pymodbus", None);
+}
+
+#[test]
+fn pymodbus_reads_activates_and_moves_over_the_network() {
+    python_peer("pymodbus", Some("tcp:127.0.0.1:0"));
 }
 
 #[test]
 fn minimalmodbus_reads_and_writes() {
-    python_peer("minimalmodbus");
+    python_peer("minimalmodbus", None);
 }
 
 #[test]

@@ -164,15 +164,26 @@ pub struct Simulation {
 impl Simulation {
     /// Starts it and waits for `ready`.
     pub fn start(glove: bool, gripper: bool) -> Self {
+        Self::with(glove, gripper.then_some("gripper"), &[])
+    }
+
+    /// The same with the gripper at `gripper`, a link in the folder or an address, and `more` options.
+    pub fn with(glove: bool, gripper: Option<&str>, more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
-        let paths = (folder.path().join("glove"), folder.path().join("gripper"));
+        let at = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+        let gripper = gripper.map(|place| match place.strip_prefix("tcp:") {
+            Some(_) => place.to_owned(),
+            None => at(place),
+        });
+        let glove = glove.then(|| at("glove"));
         let mut arguments = vec!["simulate"];
-        if glove {
-            arguments.extend(["--glove", paths.0.to_str().unwrap()]);
+        if let Some(path) = &glove {
+            arguments.extend(["--glove", path]);
         }
-        if gripper {
-            arguments.extend(["--gripper", paths.1.to_str().unwrap()]);
+        if let Some(place) = &gripper {
+            arguments.extend(["--gripper", place]);
         }
+        arguments.extend(more);
         let mut child = command(&arguments)
             .stdout(Stdio::piped())
             .stderr(Stdio::inherit())
@@ -184,6 +195,12 @@ impl Simulation {
             child,
             said,
         }
+    }
+
+    /// Where the gripper is, as it says.
+    pub fn gripper_place(&self) -> String {
+        let line = self.said.iter().find(|line| line.starts_with("gripper"));
+        line.unwrap().split_whitespace().nth(1).unwrap().to_owned()
     }
 
     pub fn glove(&self) -> String {
