@@ -27,6 +27,8 @@ fn status_reads_in_words_and_moves_nothing() {
         assert!(said.contains(word), "{said}");
     }
     assert!(!said.contains("raw"));
+    // It follows no position: none is shown as asked for.
+    assert!(said.contains("finger A         7      -"), "{said}");
     assert!(text(&bench(&["status", "--raw"], &path).stdout).contains("raw         00 00"));
     assert_eq!((gripper.writes(), gripper.motions()), (0, 0));
 }
@@ -292,4 +294,6 @@ fn one_number_moves_the_scissor_in_scissor_mode_and_the_fingers_in_the_others() 
         assert_eq!(said["axes"][axis]["position"], 90, "{said}");
     }
     assert!((gripper.positions()[3] - scissor).abs() < 1.0);
+    let led = said["axes"][3]["state"].as_str().unwrap();
+    assert!(led.contains("led by the mode"), "{said}");
 }

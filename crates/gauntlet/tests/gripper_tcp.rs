@@ -162,6 +162,44 @@ fn golden_status_replies_from_a_scripted_server_are_understood() {
 }
 
 #[test]
+fn every_golden_reply_from_a_scripted_server_is_the_status_or_a_typed_error() {
+    let Some(frames) = golden() else { return };
+    let replies = frames.iter().filter(|(_, way, _)| way == "rsp");
+    let (mut statuses, mut refused) = (0, 0);
+    for (tag, _, reply) in replies {
+        let sent = reply.clone();
+        let (port, _questions) = scripted(move |id, _| Some(with_id(&sent, id)));
+        let mut us = driver(port);
+        let mut first = None;
+        until(&mut us, None, |_, heard| {
+            first = heard.or(first);
+            first.is_some()
+        });
+        // Only a read of eight registers answers ours; echoes of writes and shorter reads do not.
+        let whole = tag == "TCP" && reply.len() == 25;
+        assert_eq!(
+            first.is_some_and(|heard| heard.is_ok()),
+            whole,
+            "{reply:02X?}"
+        );
+        if whole {
+            statuses += 1;
+            continue;
+        }
+        let error = us.0.serial_mut().error();
+        assert!(
+            matches!(error, Some(Error::Mismatch(_) | Error::Malformed(_))),
+            "{reply:02X?}: {error:?}"
+        );
+        refused += 1;
+    }
+    println!(
+        "golden TCP replies to our client: {statuses} taken, {refused} refused with a typed error"
+    );
+    assert_eq!((statuses, refused), (1, 5));
+}
+
+#[test]
 fn the_misprinted_reply_is_a_typed_error_and_the_connection_is_made_anew() {
     let Some(frames) = golden() else { return };
     let bad = frames

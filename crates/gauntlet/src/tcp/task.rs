@@ -88,8 +88,13 @@ pub(super) async fn run(
             () = tokio::time::sleep(pause) => {}
             () = refuse(&mut jobs, &mut answers) => return,
         }
-        pause = (pause * 2).min(RECONNECT_LAST);
+        pause = longer(pause);
     }
+}
+
+/// The pause after one of `pause`.
+fn longer(pause: Duration) -> Duration {
+    (pause * 2).min(RECONNECT_LAST)
 }
 
 /// Refuses every job, until the queue is closed.
@@ -239,5 +244,20 @@ fn system(cause: &std::io::Error) -> Error {
             Error::Closed
         }
         _ => Error::System(cause.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pauses_between_attempts_double_up_to_two_seconds() {
+        let pauses: Vec<u128> =
+            std::iter::successors(Some(RECONNECT_FIRST), |&pause| Some(longer(pause)))
+                .take(8)
+                .map(|pause| pause.as_millis())
+                .collect();
+        assert_eq!(pauses, [100, 200, 400, 800, 1_600, 2_000, 2_000, 2_000]);
     }
 }

@@ -249,6 +249,11 @@ impl<B> Doing<'_, B> {
     {
         let (place, raw, json) = (self.place(), self.target.raw, self.target.json);
         let started = Instant::now();
+        if !json {
+            say!(
+                "   time    state; each axis: position/asked and what it does (0 open, 255 closed)"
+            );
+        }
         let mut shown: Option<(Instant, String)> = None;
         self.waiter
             .pump(&mut self.driver, time, |driver, _, heard| {

@@ -256,7 +256,7 @@ fn positions<const X: usize>(to: &[u8], name: &str) -> Result<[u8; X], Failure> 
         let near = space::nearest(&hand.map(f32::from)).map(|count| count as u8);
         return Err(Failure::usage(
             format!("--to {}: there fingers and scissor meet", words(to)),
-            format!("--to {}, the nearest position they do not", words(&near)),
+            format!("--to {} (the nearest where they do not)", words(&near)),
         ));
     }
     Ok(position)
@@ -352,7 +352,7 @@ mod tests {
         let refused = positions::<4>(&[200, 200, 200, 200], "").unwrap_err();
         assert_eq!(refused.exit_code(), crate::failure::EXIT_USAGE);
         let near: Vec<u8> = refused.next_step()[5..]
-            .split_once(", the")
+            .split_once(" (")
             .unwrap()
             .0
             .split(',')

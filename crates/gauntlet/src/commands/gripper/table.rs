@@ -6,15 +6,29 @@ use serde_json::{Value, json};
 use super::bench::Bench;
 use crate::words;
 
+/// Software limits lie inside the mechanical stops, at most so many counts from either end.
+const LIMITS: u8 = 30;
+
 /// What an axis does. gDTx says nothing while the gripper follows no position.
 pub fn axis_words<const X: usize>(status: &Status<X>, axis: usize) -> &'static str {
     match status.contact[axis] {
         _ if !status.going_to => "not following a position",
-        // Software limits lie inside the mechanical stops: that is normal.
-        Contact::AtPosition if status.position[axis] != status.echo[axis] => {
-            "at its software limit, short of the position asked for"
-        }
+        Contact::AtPosition => match status.position[axis].abs_diff(status.echo[axis]) {
+            0 => Contact::AtPosition.meaning(),
+            // That is normal.
+            1..=LIMITS => "at its software limit, short of the position asked for",
+            _ => "standing elsewhere: at a limit, or led by the mode or finger A",
+        },
         contact => contact.meaning(),
+    }
+}
+
+/// The position asked for; none while the gripper follows none.
+fn asked<const X: usize>(status: &Status<X>, axis: usize) -> String {
+    if status.going_to {
+        status.echo[axis].to_string()
+    } else {
+        "-".to_owned()
     }
 }
 
@@ -46,7 +60,7 @@ pub fn lines<B: Bench<X>, const X: usize>(
         lines.push(format!(
             "  {name:<8}  {:>8}  {:>5}  {:>5.2} A  {}",
             status.position[axis],
-            status.echo[axis],
+            asked(status, axis),
             f32::from(status.current[axis]) * 0.01,
             axis_words(status, axis)
         ));
@@ -68,7 +82,8 @@ pub fn line<B: Bench<X>, const X: usize>(driver: &B, status: &Status<X>, raw: bo
         };
         text.push_str(&format!(
             "  {name} {:>3}/{:<3} {does}",
-            status.position[axis], status.echo[axis]
+            status.position[axis],
+            asked(status, axis)
         ));
     }
     if status.fault != Fault::None {
