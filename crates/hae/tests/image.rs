@@ -98,6 +98,7 @@ fn a_view_needs_the_bytes_that_were_checked() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "minutes")]
 fn the_check_in_pieces_finds_what_the_whole_check_finds() {
     let image = Network::random(4, [25, 300, 4]).image();
     let mut verifier = Verifier::new(&image).expect("a sound header");

@@ -85,6 +85,91 @@ fn every_size_has_the_reference_bits_and_a_small_stated_error() {
     check::<2, 6, 3>(6);
 }
 
+/// The arithmetic as its documentation says it, in other words than the crate's: floor divisions, 128 bits, the standard
+/// library's rounding. One tile of 3 inputs, 6 hidden units, 2 outputs.
+fn by_the_document(words: &[u32], q: [f32; 3]) -> [f32; 2] {
+    let half =
+        |word: u32, high: bool| i128::from(if high { word >> 16 } else { word } as u16 as i16);
+    let float = |at: usize| f32::from_bits(words[at]);
+    let u = [0, 1, 2].map(|i| {
+        let scaled: f32 = q[i] * float(24 + i);
+        scaled.round_ties_even().clamp(-32_768.0, 32_767.0) as i128
+    });
+    let h: Vec<i128> = (0..6)
+        .map(|j| {
+            let [first, second] = [words[6 + j], words[12 + j]];
+            let z = i128::from(words[j] as i32)
+                + half(first, false) * u[0]
+                + half(first, true) * u[1]
+                + half(second, false) * u[2];
+            z.max(0).div_euclid(65_536)
+        })
+        .collect();
+    [0, 1].map(|x| {
+        let a: i128 = (0..6)
+            .map(|j| half(words[18 + 3 * x + j / 2], j % 2 == 1) * h[j])
+            .sum();
+        let scaled = a.div_euclid(256) as f32 * float(28 + x);
+        scaled + float(30 + x)
+    })
+}
+
+#[test]
+fn the_arithmetic_is_the_documented_one_ties_and_negative_sums_included() {
+    let mut image = quantise(&Network::random(20, [3, 6, 2]), &poses(21, 3, 5));
+    // 1,024 steps per radian: every input below is a whole number of half steps.
+    for scale in 0..3 {
+        image[HEADER_LEN + 4 * (24 + scale)..][..4].copy_from_slice(&1024.0f32.to_le_bytes());
+    }
+    reseal(&mut image);
+    let map = Map::<3, 6, 2>::from_image(&image).expect("a sound image");
+    let (words, rng) = (words(&image), &mut rng(22));
+    let mut negative = 0;
+    for _ in 0..if cfg!(miri) { 5 } else { 2_000 } {
+        let steps = vector(rng, 3, -6.2, 6.2);
+        let q = [0, 1, 2].map(|i: usize| (steps[i] * 2048.0).round() / 2048.0);
+        let expected = by_the_document(&words, q);
+        let y = map.eval(&q).expect("in range");
+        assert_eq!(y.map(f32::to_bits), expected.map(f32::to_bits), "{q:?}");
+        negative += usize::from(y[0] < f32::from_bits(words[30]));
+    }
+    assert!(negative > 0, "no negative sum was met");
+}
+
+#[test]
+#[cfg_attr(miri, ignore = "minutes")]
+fn over_the_calibration_poses_the_mean_error_is_zero() {
+    let network = Network::random(25, [25, 300, 4]);
+    let poses = poses(26, 25, 200);
+    let (image, exact) = (quantise(&network, &poses), network.image());
+    let map = Map::<25, 300, 4>::from_image(&image).expect("a sound image");
+    let exact = Map::<25, 300, 4>::from_image(&exact).expect("a sound image");
+    let (mut mean, mut largest) = ([0.0f64; 4], 0.0f64);
+    for q in poses.chunks_exact(25) {
+        let q = q.try_into().expect("25 values");
+        let (a, b) = (
+            map.eval(q).expect("in range"),
+            exact.eval(q).expect("in range"),
+        );
+        for x in 0..4 {
+            let error = f64::from(a[x]) - f64::from(b[x]);
+            mean[x] += error / 200.0;
+            largest = largest.max(error.abs());
+        }
+    }
+    println!("mean errors {mean:?}, largest {largest}");
+    // Output and bias are rounded to binary32: some 1e-5 counts.
+    assert!(mean.iter().all(|mean| mean.abs() < 2e-5), "{mean:?}");
+}
+
+#[test]
+fn the_maker_adds_half_a_step_of_the_hidden_units() {
+    let mut network = Network::random(23, [3, 6, 2]);
+    network.b1.fill(0.0);
+    let image = quantise(&network, &poses(24, 3, 5));
+    assert_eq!(words(&image)[..6], [1 << 15; 6]);
+}
+
 #[test]
 fn every_flipped_bit_is_refused() {
     let mut image = quantise(&Network::random(7, [3, 7, 2]), &poses(8, 3, 5));
@@ -186,12 +271,29 @@ fn hostile_weights_never_overflow() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "minutes")]
+fn many_equal_units_share_the_bits_of_the_output_sum() {
+    // 600 weights of 32,767 would be beyond the parser's bound of 2^39.
+    let mut network = Network::random(27, [2, 600, 1]);
+    network.w2.fill(3.0);
+    let map = quantise(&network, &[]);
+    let map = Map::<2, 600, 1>::from_image(&map).expect("an image that its own parser takes");
+    let exact = network.eval_f64(&[2.0, -1.0]);
+    let y = map.eval(&[2.0, -1.0]).expect("in range")[0];
+    assert!(
+        (f64::from(y) / exact[0] - 1.0).abs() < 1e-3,
+        "{y} {exact:?}"
+    );
+}
+
+#[test]
 fn an_input_beyond_the_poses_is_limited() {
     let network = Network::random(12, [3, 300, 2]);
     let image = quantise(&network, &poses(13, 3, 100));
     let map = Map::<3, 300, 2>::from_image(&image).expect("a sound image");
     assert_eq!(map.eval(&[2.5, 0.0, 0.0]), map.eval(&[6.0, 0.0, 0.0]));
-    assert_ne!(map.eval(&[1.2, 0.0, 0.0]), map.eval(&[1.6, 0.0, 0.0]));
+    // A quarter more than the poses' 1.6 is still told apart.
+    assert_ne!(map.eval(&[1.7, 0.0, 0.0]), map.eval(&[1.9, 0.0, 0.0]));
     assert!(map.eval(&[7.0, 0.0, 0.0]).is_err(), "but not beyond ±2π");
 }
 
@@ -214,6 +316,21 @@ fn poses_that_do_not_fit_are_refused() {
         Err(Error::NotFinite { at: 1 })
     );
     assert_eq!(encode(&[]), Ok(448));
+}
+
+#[test]
+fn errors_are_those_of_the_bytes_that_were_checked() {
+    let network = Network::random(17, [3, 7, 2]);
+    let (image, other) = (quantise(&network, &poses(18, 3, 5)), network.image());
+    let checked = parse(&image).expect("a sound image");
+    assert!(quantized::errors(&image, &checked).is_some());
+    let mut changed = Aligned::copy_of(&image);
+    changed[192] ^= 1;
+    reseal(&mut changed);
+    assert!(quantized::errors(&changed, &checked).is_none());
+    assert!(quantized::errors(&image[..200], &checked).is_none());
+    let float = parse(&other).expect("a sound image");
+    assert!(quantized::errors(&other, &float).is_none());
 }
 
 #[test]
