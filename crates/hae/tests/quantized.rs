@@ -251,6 +251,16 @@ fn every_payload_fault_has_its_error() {
             offset: 192 + 4 * 63
         }
     );
+    // Either half of a pair counts: 3·2^29 and 32,767·2^15 are beyond 2^31.
+    for pair in [[0xff, 0x7f, 0, 0], [0, 0, 0xff, 0x7f]] {
+        let mut image = Aligned::copy_of(&image);
+        let words = [(0, (3i32 << 29).to_le_bytes()), (6, pair), (12, [0; 4])];
+        for (word, bytes) in words {
+            image[192 + 4 * word..][..4].copy_from_slice(&bytes);
+        }
+        reseal(&mut image);
+        assert_eq!(parse(&image), Err(Error::Overflow), "{pair:?}");
+    }
 }
 
 #[test]
@@ -273,17 +283,25 @@ fn hostile_weights_never_overflow() {
 #[test]
 #[cfg_attr(miri, ignore = "minutes")]
 fn many_equal_units_share_the_bits_of_the_output_sum() {
-    // 600 weights of 32,767 would be beyond the parser's bound of 2^39.
+    // 600 weights of 32,767 would be beyond the bound of 2^39.
     let mut network = Network::random(27, [2, 600, 1]);
+    network.w1.fill(0.2);
+    network.b1.fill(0.1);
     network.w2.fill(3.0);
-    let map = quantise(&network, &[]);
-    let map = Map::<2, 600, 1>::from_image(&map).expect("an image that its own parser takes");
+    let mut image = quantise(&network, &[]);
+    let map = Map::<2, 600, 1>::from_image(&image).expect("an image that its own parser takes");
     let exact = network.eval_f64(&[2.0, -1.0]);
     let y = map.eval(&[2.0, -1.0]).expect("in range")[0];
     assert!(
         (f64::from(y) / exact[0] - 1.0).abs() < 1e-3,
         "{y} {exact:?}"
     );
+    // And the parser does not take them.
+    for tile in image[HEADER_LEN..].chunks_exact_mut(4 * 15).take(100) {
+        tile[4 * 12..].copy_from_slice(&[0xff, 0x7f].repeat(6));
+    }
+    reseal(&mut image);
+    assert_eq!(parse(&image), Err(Error::Overflow));
 }
 
 #[test]
