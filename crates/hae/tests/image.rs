@@ -95,6 +95,13 @@ fn a_view_needs_the_bytes_that_were_checked() {
     let mut shifted = Aligned::zeroed(452);
     shifted[4..].copy_from_slice(&bytes);
     assert!(Map::<1, 2, 1>::view(&shifted[4..], &checked).is_none());
+    // A smaller shape would fit the bytes.
+    let image = Network::random(5, [3, 20, 2]).image();
+    let checked = parse(&image).expect("a sound image");
+    assert!(Map::<3, 20, 2>::view(&image, &checked).is_some());
+    assert!(Map::<3, 20, 1>::view(&image, &checked).is_none());
+    assert!(Map::<3, 19, 2>::view(&image, &checked).is_none());
+    assert!(Map::<2, 20, 2>::view(&image, &checked).is_none());
 }
 
 #[test]

@@ -86,6 +86,19 @@ fn every_payload_fault_has_its_error() {
         "2π·1e38"
     );
     assert_eq!(
+        fault(196, &3e37f32.to_le_bytes()),
+        Error::Overflow,
+        "3·2π·3e37, but not 3·3e37"
+    );
+    let mut without_output = tiny_with(196, &3e37f32.to_le_bytes());
+    without_output[200..204].fill(0);
+    reseal(&mut without_output);
+    assert_eq!(
+        parse(&without_output),
+        Err(Error::Overflow),
+        "a hidden unit that no output uses"
+    );
+    assert_eq!(
         fault(200, &3e38f32.to_le_bytes()),
         Error::Overflow,
         "second layer"
