@@ -2,17 +2,20 @@
 //!
 //! `cargo run --release -p trainer --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
 //! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or
-//! `M2,rate,ramp start,ramp,batches,decay`. `-- speed` prints the table of times a step, `-- speed 2` on two threads.
+//! `M2,rate,ramp start,ramp,batches,decay`. `-- speed 2` prints the table of times a step on two threads, with the phases of a step and
+//! how it grows. Without a word it prints all there is about speed, and draws the growth into `target/bench-train`.
 
 use core::ops::ControlFlow;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::path::Path;
 use std::time::Instant;
 use trainer::algorithm::{InUnits, PairPlan, Plan, Schedule, Settings, Trainer};
 use trainer::cost::fast::Steps;
 use trainer::cost::reference::Autoencoder;
 use trainer::cost::{Cost, Lambda, Weights};
 use trainer::data::{Matrix, Pairs, Split, split};
+use trainer::figures::{Chart, Curve};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::Normalisation;
 use trainer::motion::Generator;
@@ -336,7 +339,8 @@ fn tasks() -> [(&'static str, Size); 2] {
     [("SP1", sp1), ("hand", hand)]
 }
 
-fn speed(threads: usize) {
+/// Prints a step's times, task by task and along each size. Returns for each task how the time on the wall grows.
+fn speed(threads: usize) -> Vec<Chart> {
     let full = Cost::Hae.weights(&Lambda::SHAPES);
     let phases = Steps::PHASES.join(" | ");
     println!("| task, {threads} threads | processor ms a step | least on the wall | {phases} |");
@@ -346,9 +350,10 @@ fn speed(threads: usize) {
         print!("| {name} | {:.2} | {:.2} |", times.processor, times.least);
         times.phases.iter().for_each(|ms| print!(" {ms:.3} |"));
         println!();
+        times.least
     };
-    for (name, size) in tasks() {
-        row(&format!("{name}, everything"), &size, &full);
+    let charts = tasks().map(|(name, size)| {
+        let whole = row(&format!("{name}, everything"), &size, &full);
         let without = |change: fn(&mut Weights)| {
             let mut weights = full;
             change(&mut weights);
@@ -362,40 +367,85 @@ fn speed(threads: usize) {
         ] {
             row(&format!("{name} without {term}"), &size, &weights);
         }
-        for factor in [2, 4] {
-            for (what, grow) in GROWTHS {
+        let curves = GROWTHS.map(|(what, grow)| {
+            let mut points = vec![(1.0, whole)];
+            for factor in [2, 4] {
                 let mut grown = size;
                 *grow(&mut grown) *= factor;
-                row(&format!("{name}, {what} × {factor}"), &grown, &full);
+                let least = row(&format!("{name}, {what} × {factor}"), &grown, &full);
+                points.push((factor as f64, least));
+            }
+            Curve {
+                name: what.into(),
+                points,
+            }
+        });
+        Chart {
+            title: format!("{name}, {threads} threads"),
+            x_label: "times as many".into(),
+            y_label: "ms a step".into(),
+            curves: curves.into(),
+            ..Chart::default()
+        }
+    });
+    charts.into()
+}
+
+/// Everything that one may want to know of the speed; the growth is drawn into this folder.
+fn everything(folder: &Path) -> Result<()> {
+    let charts: Vec<Chart> = [1, 2].into_iter().flat_map(speed).collect();
+    std::fs::create_dir_all(folder)?;
+    let drawing = folder.join("training-time.svg");
+    trainer::figures::charts(&drawing, &charts)?;
+    println!("drawn into {}", drawing.display());
+    println!("| model | threads | s | processor s | resident MB so far |\n|---|---|---|---|---|");
+    for threads in [1, 2] {
+        for (schedule, word) in [(Schedule::Fast, "fast"), (Schedule::Paper, "paper")] {
+            for name in ["sp1", "hand"] {
+                let (_, [wall, processor]) = train(name, schedule, 1, threads)?;
+                let memory = peak_memory().unwrap_or(f64::NAN);
+                println!(
+                    "| {name}, {word} | {threads} | {wall:.2} | {processor:.2} | {memory:.0} |"
+                );
             }
         }
     }
+    Ok(())
+}
+
+/// Most megabytes that this process has held at a time; `None` where the system does not tell.
+fn peak_memory() -> Option<f64> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
+    Some(line.split_whitespace().nth(1)?.parse::<f64>().ok()? / 1024.0)
 }
 
 /// A size by its name.
 type Growth = (&'static str, fn(&mut Size) -> &mut usize);
 
 /// Along what a step's time is measured.
-const GROWTHS: [Growth; 4] = [
+const GROWTHS: [Growth; 5] = [
     ("N_Q", |size| &mut size.q),
     ("N_X", |size| &mut size.x),
     ("H", |size| &mut size.hidden),
     ("D_Q", |size| &mut size.dq),
+    ("D_X", |size| &mut size.dx),
 ];
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let word = |n: usize, default: &'static str| words.get(n).map_or(default, String::as_str);
-    match word(0, "speed") {
+    match word(0, "all") {
         "quality" => quality(
             word(1, "sp1"),
             word(2, "fast"),
             word(3, "5").parse()?,
             word(4, "2").parse()?,
         ),
-        _ => {
+        "speed" => {
             speed(word(1, "1").parse()?);
             Ok(())
         }
+        _ => everything(Path::new(word(1, "target/bench-train"))),
     }
 }

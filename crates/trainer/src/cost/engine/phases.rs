@@ -238,21 +238,14 @@ impl Engine {
             with_jacobian: &[],
             distortion: 0.0,
         };
+        let machine = self.machine;
         self.pool.for_each(&mut parts, |part: &mut UnitPart| {
             let (net, total) = if part.of_f {
                 (f, total_f)
             } else {
                 (g, total_g)
             };
-            let UnitPart {
-                units,
-                gradient: to,
-                ..
-            } = part;
-            to.clear();
-            gradient(net, total, units.clone(), &mut |at, value| {
-                to.push((at as u32, value));
-            });
+            gradient(machine, net, total, part.units.clone(), &mut part.gradient);
         });
         for part in &parts {
             let start = if part.of_f { 0 } else { self.f.len() };

@@ -4,6 +4,7 @@ use super::super::lanes::{LANES, Lanes};
 use super::super::tree::Tree;
 use super::super::{Machine, dispatch};
 use super::{Cut, Net, Trace, outer_product};
+use core::ops::Range;
 
 /// Samples of a table's row, subsets of them, rows of a leaf's table.
 const GROUP: usize = 4;
@@ -381,68 +382,97 @@ pub(crate) struct Total<'a> {
     pub(crate) distortion: f32,
 }
 
-/// The gradient by the weights of units `units` (and by b2, if the first is 0), flat, from the sums.
-pub(crate) fn gradient(
+dispatch! {
+    /// The gradient by the weights of units `units` (and by b2, if the first is 0) from the sums: places in the flat form, and numbers.
+    pub(crate) fn gradient / gradient_kernel(
+        net: Net<'_>,
+        total: Total<'_>,
+        units: Range<usize>,
+        out: &mut Vec<(u32, f32)>,
+    )
+}
+
+#[inline(always)]
+unsafe fn gradient_kernel<V: Lanes>(
     net: Net<'_>,
     total: Total<'_>,
-    units: core::ops::Range<usize>,
-    put: &mut impl FnMut(usize, f32),
+    units: Range<usize>,
+    out: &mut Vec<(u32, f32)>,
 ) {
     let shape = net.shape;
     let (inputs, outputs, map) = (shape.inputs, shape.outputs, shape.map());
-    let mut sum = vec![0.0_f32; shape.sum_row(true)];
-    let gather = |row: usize, sum: &mut [f32]| {
-        sum.fill(0.0);
-        for (parts, with) in [(total.plain, false), (total.with_jacobian, true)] {
-            let width = shape.sum_row(with);
-            let used = map + if with { inputs * outputs } else { 0 };
-            for part in parts {
-                let part = &part[row * width..][..used];
-                sum.iter_mut().zip(part).for_each(|(s, p)| *s += p);
-            }
+    let mut plain = vec![0.0_f32; shape.sum_row(false)];
+    let mut whole = vec![0.0_f32; shape.sum_row(true)];
+    // What comes after E in rows without Jacobians is undefined, so E of both kinds is added apart.
+    let gather = |row: usize, plain: &mut [f32], whole: &mut [f32]| {
+        // SAFETY: features by the caller.
+        unsafe {
+            add_rows::<V>(row, total.plain, plain);
+            add_rows::<V>(row, total.with_jacobian, whole);
         }
+        let both = whole.iter_mut().zip(&*plain).take(map);
+        both.for_each(|(whole, plain)| *whole += plain);
     };
+    let c = 2.0 * total.distortion;
     let mut by_w2 = vec![0.0_f32; outputs];
+    out.clear();
     for j in units.clone() {
-        gather(j, &mut sum);
+        gather(j, &mut plain, &mut whole);
         let unit = &net.copies.units[j * shape.unit()..(j + 1) * shape.unit()];
         let (w1, w2) = unit.split_at(inputs + 1);
-        let c = 2.0 * total.distortion;
         by_w2.fill(0.0);
         for (i, w) in w1.iter().enumerate() {
-            let e = &sum[i * outputs..(i + 1) * outputs];
+            let e = &whole[i * outputs..(i + 1) * outputs];
             let mut by_w1 = dot(e, w2);
             by_w2.iter_mut().zip(e).for_each(|(s, e)| *s += w * e);
             if i < inputs && total.distortion != 0.0 {
-                let jacobian = &sum[map + i * outputs..map + (i + 1) * outputs];
+                let jacobian = &whole[map + i * outputs..map + (i + 1) * outputs];
                 by_w1 += c * dot(jacobian, w2);
                 let jacobian = by_w2.iter_mut().zip(jacobian);
                 jacobian.for_each(|(s, e)| *s += c * w * e);
             }
-            put(i * shape.padded() + j, by_w1);
+            out.push(((i * shape.padded() + j) as u32, by_w1));
         }
         for (k, &by_w2) in by_w2.iter().enumerate() {
-            put(shape.w2() + k * shape.padded() + j, by_w2);
+            out.push(((shape.w2() + k * shape.padded() + j) as u32, by_w2));
         }
     }
     if units.start == 0 {
-        gather(shape.hidden, &mut sum);
-        for (k, &by_b2) in sum[inputs * outputs..map].iter().enumerate() {
-            put(shape.b2() + k, by_b2);
+        gather(shape.hidden, &mut plain, &mut whole);
+        let by_b2 = whole[inputs * outputs..map].iter().enumerate();
+        out.extend(by_b2.map(|(k, &by_b2)| ((shape.b2() + k) as u32, by_b2)));
+    }
+}
+
+/// sum = Σ of one row of all parts.
+#[inline(always)]
+unsafe fn add_rows<V: Lanes>(row: usize, parts: &[&[f32]], sum: &mut [f32]) {
+    let width = sum.len();
+    assert!(width.is_multiple_of(LANES));
+    assert!(parts.iter().all(|part| part.len() >= (row + 1) * width));
+    for at in (0..width).step_by(LANES) {
+        // SAFETY: the lengths were checked; features by the caller.
+        unsafe {
+            let mut total = V::splat(0.0);
+            for part in parts {
+                total = total.add(V::load(part.as_ptr().add(row * width + at)));
+            }
+            total.store(sum.as_mut_ptr().add(at));
         }
     }
 }
 
 /// Σ a·b in eight sums.
+#[inline(always)]
 fn dot(a: &[f32], b: &[f32]) -> f32 {
     let mut sums = [0.0_f32; 8];
     let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
     let rest = a8.remainder().iter().zip(b8.remainder());
-    let rest: f32 = rest.map(|(a, b)| a * b).sum();
+    let rest = rest.fold(0.0, |sum, (a, b)| sum + a * b);
     for (a, b) in a8.zip(b8) {
         for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
             *sum += a * b;
         }
     }
-    sums.iter().sum::<f32>() + rest
+    sums.iter().fold(rest, |sum, s| sum + s)
 }
