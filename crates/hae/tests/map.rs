@@ -99,20 +99,27 @@ fn a_non_finite_or_far_input_is_refused_by_name() {
 
 #[test]
 fn a_sum_of_nothing_is_plus_zero() {
-    // All products are −0: lane sums start at +0, so the output is +0 + −0 = +0.
+    // All products are −0, in every lane: lane sums start at +0, so the output is +0 + −0 = +0.
     let network = Network {
         inputs: 1,
-        hidden: 1,
+        hidden: 16,
         outputs: 1,
-        w1: vec![-1.0],
-        b1: vec![-0.0],
-        w2: vec![-1.0],
+        w1: vec![-1.0; 16],
+        b1: vec![-0.0; 16],
+        w2: vec![-1.0; 16],
         b2: vec![-0.0],
     };
-    let image = network.image();
-    let map = Map::<1, 1, 1>::from_image(&image).expect("a sound image");
-    assert_eq!(map.eval(&[0.0]).expect("in range")[0].to_bits(), 0);
     assert_eq!(reference(&network, &[0.0]), [0]);
+    let image = network.image();
+    let map = Map::<1, 16, 1>::from_image(&image).expect("a sound image");
+    assert_eq!(map.eval(&[0.0]).expect("in range")[0].to_bits(), 0);
+    for kernel in Kernel::ALL {
+        let mut buffer = AlignedFloats::zeroed(packed_len(1, 16, 1));
+        if let Ok(map) = map.repack_for(kernel, &mut buffer) {
+            let y = map.eval(&[0.0]).expect("in range")[0];
+            assert_eq!(y.to_bits(), 0, "{kernel:?}");
+        }
+    }
 }
 
 #[test]
