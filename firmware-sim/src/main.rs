@@ -7,9 +7,9 @@
 
 mod board;
 
-use board::{Board, Port, PsramSlot, SystemTime, Watchdog, wait_for_interrupt};
+use board::{Board, Port, PsramSlot, StackWatch, SystemTime, Watchdog, wait_for_interrupt};
 use bridge::gripper::driver::ThreeFinger;
-use bridge::protocol::{Outcome, Server};
+use bridge::protocol::{self, Outcome, Server};
 use bridge::{App, Config, Instant, Platform, WeightsStore, glove, gripper};
 
 /// Axes of the 3-Finger gripper.
@@ -51,6 +51,7 @@ fn run(board: Board) {
         gripper,
         slots,
         mut watchdog,
+        mut stack,
     } = board;
     let store = WeightsStore::new(slots, bridge::app::expected(AXES));
     let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
@@ -58,15 +59,26 @@ fn run(board: Board) {
     let mut app: Bridge = App::new(Machine { time }, scanner, gripper, store, Config::default());
     let mut server = Server::new(host);
     watchdog.start();
-    while turn(&mut app, &mut server, &mut watchdog) == Outcome::Continue {}
+    while turn(&mut app, &mut server, &mut watchdog, &mut stack) == Outcome::Continue {}
     cortex_m::peripheral::SCB::sys_reset()
 }
 
 /// One turn of the loop: the bridge, the host, then sleep until something is due.
-fn turn(app: &mut Bridge, server: &mut Server<Port>, watchdog: &mut Watchdog) -> Outcome {
+///
+/// A function of its own, so that what it can reach can be told in the linked program.
+#[inline(never)]
+fn turn(
+    app: &mut Bridge,
+    server: &mut Server<Port>,
+    watchdog: &mut Watchdog,
+    stack: &mut StackWatch,
+) -> Outcome {
     let due = app.step();
     let outcome = server.poll(app.telemetry().now, app);
-    server.tell_bytes_lost(board::bytes_lost());
+    server.tell_board(protocol::Board {
+        bytes_lost: board::bytes_lost(),
+        stack_used: stack.look(),
+    });
     watchdog.feed();
     app.platform_mut().wait_until(due);
     outcome

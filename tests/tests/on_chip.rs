@@ -11,7 +11,7 @@ use loop_tests::images::index_finger;
 
 /// A machine with much to do can keep the emulator waiting for longer than a sample may be old; the bridge then holds, as
 /// it should, and the stretch says nothing about the loop.
-const STRETCHES: usize = 4;
+const STRETCHES: usize = 3;
 
 #[test]
 fn every_fresh_glove_frame_is_answered_and_no_byte_is_lost_in_the_queues() {
@@ -46,6 +46,9 @@ fn every_fresh_glove_frame_is_answered_and_no_byte_is_lost_in_the_queues() {
         "{calm:?}"
     );
     assert!(calm.moved, "the gripper did not move");
+    let stack = calm.grown.stack_used;
+    println!("stack: {stack} bytes at most");
+    assert!((1_000..32_768).contains(&stack), "{stack} bytes of stack");
 }
 
 #[test]

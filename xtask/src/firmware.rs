@@ -1,9 +1,11 @@
 //! The firmware: built, and started in QEMU.
 
+use crate::elf::Program;
+use crate::figures::{self, Figures, Mode};
 use crate::step::{self, Failure};
-use crate::thumb;
-use std::path::PathBuf;
-use std::process::Command;
+use crate::{surprises, thumb};
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
 const EMULATOR: &str = "qemu-system-arm";
 
@@ -19,6 +21,80 @@ pub fn build() -> Result<PathBuf, Failure> {
             .env("CARGO_TARGET_DIR", &target),
     )?;
     Ok(target.join(thumb::TARGET).join("release/firmware-sim"))
+}
+
+/// Holds the linked program against what is promised of it: no way to a panic, no allocator, its size.
+pub fn inspect(elf: &Path, mode: Mode) -> Result<(), Failure> {
+    let bytes = std::fs::read(elf).map_err(|error| format!("{}: {error}", elf.display()))?;
+    let program = Program::parse(bytes)
+        .ok_or_else(|| format!("{}: not an ELF file of the chip", elf.display()))?;
+    surprises::check(elf, &program)?;
+    let sizes = [
+        (
+            "size.text",
+            program.size_of(".vector_table") + program.size_of(".text"),
+        ),
+        ("size.rodata", program.size_of(".rodata")),
+        ("size.data", program.size_of(".data")),
+        (
+            "size.bss",
+            program.size_of(".bss") + program.size_of(".uninit"),
+        ),
+    ];
+    let sizes = sizes.map(|(name, bytes)| (name.to_owned(), bytes)).to_vec();
+    figures::hold(&sizes, mode)
+}
+
+/// Instruction counts under `-icount`, of the image `bench` beside the firmware.
+pub fn count(elf: &Path, mode: Mode) -> Result<(), Failure> {
+    let output = campaign("count")
+        .env("GAUNTLET_FIRMWARE", elf)
+        .stderr(Stdio::inherit())
+        .output()
+        .map_err(|error| format!("the counts: {error}"))?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let counts: Option<Figures> = text
+        .lines()
+        .map(|line| {
+            let mut words = line.split(' ');
+            let name = format!("count.{}", words.next()?);
+            Some((name, words.next()?.parse().ok()?))
+        })
+        .collect();
+    match counts.filter(|counts| output.status.success() && !counts.is_empty()) {
+        Some(counts) => figures::hold(&counts, mode),
+        None => Err(format!("the chip did not count; it said {text:?}")),
+    }
+}
+
+/// The long runs of the package `loop-tests`.
+pub fn campaign(what: &str) -> Command {
+    step::cargo(&[
+        "run",
+        "--quiet",
+        "--locked",
+        "--package",
+        "loop-tests",
+        "--bin",
+        "campaign",
+        "--",
+        what,
+    ])
+}
+
+/// A campaign that needs the firmware and QEMU.
+pub fn run_campaign(what: &str) -> Result<(), Failure> {
+    require_emulator()?;
+    let elf = build()?;
+    step::run(what, campaign(what).env("GAUNTLET_FIRMWARE", elf))
+}
+
+/// Writes down sizes and counts as those of the compiler in use.
+pub fn record() -> Result<(), Failure> {
+    require_emulator()?;
+    let elf = build()?;
+    inspect(&elf, Mode::Record)?;
+    count(&elf, Mode::Record)
 }
 
 /// Makes sure that QEMU is there: installs Debian's package where that is allowed.

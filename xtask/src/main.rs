@@ -1,12 +1,15 @@
-//! One entry for the project's chores: `cargo xtask test | firmware | qemu | bench | campaign | fuzz | docs`.
+//! One entry for the project's chores: `cargo xtask test | firmware | qemu | powercut | same-bits | bench | campaign | fuzz | docs`.
 //!
 //! The chores only start other programs (cargo, rustup, apt-get, qemu); what they check lives in the crates.
 
 mod bench;
 mod campaign;
+mod elf;
+mod figures;
 mod firmware;
 mod fuzz;
 mod step;
+mod surprises;
 mod test;
 mod thumb;
 
@@ -18,8 +21,13 @@ usage: cargo xtask <chore> [options]
 chores:
   test [--host-only]  everything that must hold before a change lands: format, clippy, docs, the
                       device crates and the firmware built for the microcontroller, all tests
-  firmware            build the device crates (no_std) and the firmware for thumbv7em-none-eabihf
+  firmware            build the device crates (no_std) and the firmware for thumbv7em-none-eabihf; check that
+                      the loop cannot panic, that there is no allocator, and that the program has not grown
+  figures --record    write sizes and instruction counts down as those of the compiler in use
   qemu                start the firmware in QEMU, its three ports as sockets in a private folder
+  qemu --measure      the whole loop in QEMU for 60 s: rates and losses
+  same-bits           the map and the whole bridge on the emulated chip and here, bit by bit
+  powercut            power cuts in the weights store, any slot contents, QEMU killed while flashing
   bench map           the map's kernels against peers and against this machine's roof
   bench train         the time of a training step and of a model
   campaign gripper    the gripper's long campaigns: rates beside the glove, cut wires; minutes
@@ -36,8 +44,15 @@ fn main() -> ExitCode {
     let outcome = match words.as_slice() {
         ["test"] => test::run(test::Scope::Everything),
         ["test", "--host-only"] => test::run(test::Scope::HostOnly),
-        ["firmware"] => firmware::build().map(|elf| println!("firmware: {}", elf.display())),
+        ["firmware"] => firmware::build().and_then(|elf| {
+            println!("firmware: {}", elf.display());
+            firmware::inspect(&elf, figures::Mode::Check)
+        }),
+        ["figures", "--record"] => firmware::record(),
         ["qemu"] => firmware::emulate(),
+        ["qemu", "--measure"] => firmware::run_campaign("measure"),
+        ["same-bits"] => firmware::run_campaign("same-bits"),
+        ["powercut"] => firmware::run_campaign("powercut"),
         ["bench", "map"] => bench::map(),
         ["bench", "train"] => bench::train(),
         ["campaign", "gripper"] => campaign::gripper(),

@@ -1,5 +1,6 @@
 //! Everything that must hold before a change lands.
 
+use crate::figures::Mode;
 use crate::step::{self, Failure, cargo};
 use crate::{firmware, thumb};
 use std::path::{Path, PathBuf};
@@ -47,6 +48,10 @@ pub fn run(scope: Scope) -> Result<(), Failure> {
         }
     };
     tests(firmware.as_deref())?;
+    if let Some(elf) = &firmware {
+        println!("==> instruction counts on the emulated chip");
+        firmware::count(elf, Mode::Check)?;
+    }
     println!(
         "all steps passed in {:.0} s",
         started.elapsed().as_secs_f64()
@@ -70,6 +75,7 @@ fn format() -> Result<(), Failure> {
 fn on_chip() -> Result<PathBuf, Failure> {
     firmware::require_emulator()?;
     let elf = firmware::build()?;
+    firmware::inspect(&elf, Mode::Check)?;
     if !thumb::is_installed() {
         println!("skipped: clippy of the firmware (Debian's compiler brings none)");
         return Ok(elf);

@@ -55,6 +55,20 @@ pub fn build_command(arguments: &[&str]) -> Result<Command, Failure> {
     }
 }
 
+/// The compiler that builds for [`TARGET`], by its own words.
+pub fn compiler() -> Result<String, Failure> {
+    let mut command = match toolchain()? {
+        Toolchain::Installed => Command::new("rustc"),
+        Toolchain::FromSource { .. } => Command::new("/usr/bin/rustc"),
+    };
+    let output = command
+        .arg("--version")
+        .current_dir(step::workspace_root())
+        .output()
+        .map_err(|error| format!("rustc does not start: {error}"))?;
+    Ok(String::from_utf8_lossy(&output.stdout).trim().to_owned())
+}
+
 /// Whether the toolchain in use has the target's library.
 pub fn is_installed() -> bool {
     sysroot().is_some_and(|sysroot| has_core(&sysroot))

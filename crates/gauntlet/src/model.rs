@@ -118,6 +118,11 @@ fn errors(image: &[u8], checked: &Checked) -> Option<Int16> {
     })
 }
 
+const _: () = assert!(
+    bridge::HIDDEN == trainer::network::HIDDEN,
+    "the bridge runs maps of the size that the trainer makes"
+);
+
 /// Loads a model that maps 25 joint angles to the gripper's 4 positions with as many hidden units as the bridge runs.
 ///
 /// # Errors

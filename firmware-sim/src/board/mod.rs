@@ -3,11 +3,13 @@
 
 mod flash;
 mod interrupts;
+mod stack;
 mod time;
 mod uart;
 mod watchdog;
 
 pub use flash::PsramSlot;
+pub use stack::StackWatch;
 pub use time::{SystemTime, wait_for_interrupt};
 use uart::Uart;
 pub use uart::{Port, bytes_lost};
@@ -30,6 +32,8 @@ pub struct Board {
     pub slots: [PsramSlot; 2],
     /// Resets the machine unless fed.
     pub watchdog: Watchdog,
+    /// Tells how deep the stack has been.
+    pub stack: StackWatch,
 }
 
 impl Board {
@@ -49,6 +53,7 @@ impl Board {
             gripper,
             slots,
             watchdog: Watchdog::new(),
+            stack: StackWatch::start(),
         })
     }
 }

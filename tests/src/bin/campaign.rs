@@ -197,6 +197,7 @@ fn measure() -> Result<(), String> {
         "lost bytes host {}, glove {}, gripper {}; the gripper moved: {}",
         grown.bytes_lost[0], grown.bytes_lost[1], grown.bytes_lost[2], stretch.moved
     );
+    println!("stack      {} bytes at most", grown.stack_used);
     if grown.bytes_lost != [0; 3] {
         return Err("bytes were lost".to_owned());
     }

@@ -11,9 +11,12 @@
 //! driver handed the request that carries the command to its port: seen by the link's count of writing requests going up
 //! in a poll while the command is set. The 29 bytes of the request then take 2.5 ms at 115200 baud.
 
-use crate::config::Config;
+mod controls;
 mod tick;
 
+pub use controls::Controls;
+
+use crate::config::Config;
 use crate::event::{self, Event, Kind, Request};
 use crate::platform::{Platform, Slot};
 use crate::posture::Posture;

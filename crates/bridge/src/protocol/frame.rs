@@ -7,7 +7,7 @@ use crc::{CRC_32_ISO_HDLC, Crc, Table};
 use heapless::Vec;
 
 /// The CRC of frames and of whole images.
-pub(super) const CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
+pub(super) static CRC32: Crc<u32, Table<1>> = Crc::<u32, Table<1>>::new(&CRC_32_ISO_HDLC);
 const CRC_BYTES: usize = 4;
 /// Bytes of the longest message.
 pub const MAX_MESSAGE: usize = 640;

@@ -242,6 +242,8 @@ pub struct Counters {
     pub host_malformed: u32,
     /// Bytes that each port lost because a queue was full: host, glove, gripper.
     pub bytes_lost: [u32; 3],
+    /// Most bytes of stack that were ever in use; 0 where nobody looks.
+    pub stack_used: u32,
 }
 
 /// What is now.

@@ -3,8 +3,11 @@
 //! postcard messages ([`message`]) in COBS frames with a CRC-32 ([`frame`]), stop and wait; [`Server`] is the bridge's end.
 //! Any garbage on the line is survived and counted. `docs/protocol.md` fixes the bytes.
 
+mod configuration;
 pub mod frame;
 pub mod message;
+mod outgoing;
 mod server;
+mod slow;
 
-pub use server::{Outcome, Server};
+pub use server::{Board, Outcome, Server};

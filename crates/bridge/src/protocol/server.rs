@@ -1,15 +1,18 @@
 //! The bridge's end of the host protocol: takes requests from a port, has [`App`] do them, answers.
 
-use super::frame::{self, Decoder, MAX_FRAME, MAX_MESSAGE};
+use super::configuration::{self, per_axis};
+use super::frame::{Decoder, MAX_MESSAGE};
 use super::message::{
-    AXES, Answer, CHUNK, Call, Configuration, Counters, FromBridge, GripperStatus, Hello, PerAxis,
-    Refusal, Reply, Request, SETTING_NAMES, Sample, SlotContents, Slots, Status, VERSION,
+    Answer, CHUNK, Call, Configuration, Counters, FromBridge, GripperStatus, Hello, Refusal, Reply,
+    Request, Sample, Status, VERSION,
 };
-use crate::store::{Contents, WeightsStore};
+use super::outgoing::Outgoing;
+use super::slow::{Reading, Slow};
+use crate::app::Controls;
+use crate::store::WeightsStore;
 use crate::telemetry::bump;
-use crate::{App, Config, Duration, Instant, Platform, Settings, Slot, config};
+use crate::{Config, Duration, Instant, Slot};
 use embedded_io::{Read, ReadReady, Write};
-use gripper::Gripper;
 
 /// A host that wrote or held the clutch and then said nothing for so long has lost its session.
 const LEASE: Duration = Duration::from_millis(2_000);
@@ -27,6 +30,15 @@ pub enum Outcome {
     Reboot,
 }
 
+/// What only the board can count.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Board {
+    /// Bytes that the host's, the glove's and the gripper's port have lost.
+    pub bytes_lost: [u32; 3],
+    /// Most bytes of stack that were ever in use; 0 where nobody looks.
+    pub stack_used: u32,
+}
+
 /// The bridge's end of one port.
 #[derive(Debug)]
 pub struct Server<S> {
@@ -40,10 +52,12 @@ pub struct Server<S> {
     reply: Outgoing,
     /// Session and sequence of the request that `reply` answers: when it comes again, so does the reply.
     answered: Option<(u32, u16)>,
+    /// The request that is done in pieces, its session and sequence.
+    slow: Option<(Slow, u32, u16)>,
     sample: Outgoing,
     rebooting: bool,
-    /// Bytes each port has lost, told by the board.
-    bytes_lost: [u32; 3],
+    /// Told by the board.
+    board: Board,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -58,14 +72,6 @@ struct Telemetry {
     due: Instant,
 }
 
-/// A frame on its way out.
-#[derive(Debug)]
-struct Outgoing {
-    bytes: [u8; MAX_FRAME],
-    sent: usize,
-    length: usize,
-}
-
 impl<S: Read + ReadReady + Write> Server<S> {
     /// A server on `port`.
     pub const fn new(port: S) -> Self {
@@ -78,9 +84,13 @@ impl<S: Read + ReadReady + Write> Server<S> {
             announced_crc: 0,
             reply: Outgoing::EMPTY,
             answered: None,
+            slow: None,
             sample: Outgoing::EMPTY,
             rebooting: false,
-            bytes_lost: [0; 3],
+            board: Board {
+                bytes_lost: [0; 3],
+                stack_used: 0,
+            },
         }
     }
 
@@ -89,26 +99,16 @@ impl<S: Read + ReadReady + Write> Server<S> {
         &self.port
     }
 
-    /// Tells how many bytes the host's, the glove's and the gripper's port have lost, for the counters.
-    pub const fn tell_bytes_lost(&mut self, lost: [u32; 3]) {
-        self.bytes_lost = lost;
+    /// Tells what only the board knows, for the counters.
+    pub const fn tell_board(&mut self, board: Board) {
+        self.board = board;
     }
 
-    /// Goes on with whatever is under way: sends, takes bytes, does at most one request. Never waits.
+    /// Goes on with whatever is under way: sends, takes bytes, does at most one request or a piece of one. Never waits.
     ///
-    /// Checking or erasing flash happens inside a request and may take longer than a step of the loop; the store refuses
-    /// such requests while the clutch is closed.
-    pub fn poll<P, G, R, F, const X: usize>(
-        &mut self,
-        now: Instant,
-        app: &mut App<P, G, R, F, X>,
-    ) -> Outcome
-    where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+    /// Flash that is erased keeps the processor for as long as it takes: one sector a poll. The store refuses to be written
+    /// while the clutch is closed.
+    pub fn poll<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) -> Outcome {
         if self.send() {
             return Outcome::Continue;
         }
@@ -116,7 +116,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
             return Outcome::Reboot;
         }
         self.end_lease(now);
-        self.receive(now, app);
+        if self.slow.is_some() {
+            self.go_on(now, app);
+        } else {
+            self.receive(now, app);
+        }
         if !self.reply.is_busy() {
             self.take_sample(now, app);
         }
@@ -134,13 +138,9 @@ impl<S: Read + ReadReady + Write> Server<S> {
         first.send(&mut self.port) || second.send(&mut self.port)
     }
 
-    fn receive<P, G, R, F, const X: usize>(&mut self, now: Instant, app: &mut App<P, G, R, F, X>)
-    where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+    fn receive<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) {
+        // The message is copied out, so that the decoder is free while the request is done.
+        let mut message = [0; MAX_MESSAGE];
         for _ in 0..BYTES_A_POLL {
             if !matches!(self.port.read_ready(), Ok(true)) {
                 return;
@@ -149,8 +149,6 @@ impl<S: Read + ReadReady + Write> Server<S> {
             if !matches!(self.port.read(&mut byte), Ok(1)) {
                 return;
             }
-            // The message is copied out, so that the decoder is free while the request is done.
-            let mut message = [0; MAX_MESSAGE];
             let length = self.decoder.push(byte[0], |bytes| {
                 let length = bytes.len().min(MAX_MESSAGE);
                 if let (Some(to), Some(from)) = (message.get_mut(..length), bytes.get(..length)) {
@@ -168,27 +166,27 @@ impl<S: Read + ReadReady + Write> Server<S> {
         }
     }
 
-    fn serve<P, G, R, F, const X: usize>(
+    fn serve<A: Controls<X>, const X: usize>(
         &mut self,
         now: Instant,
         request: &Request<'_>,
-        app: &mut App<P, G, R, F, X>,
-    ) where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+        app: &mut A,
+    ) {
         let &Request {
             session, sequence, ..
         } = request;
         let is_hello = matches!(request.call, Call::Hello { .. });
         if self.answered == Some((session, sequence)) && !is_hello {
             // The reply was lost: the request was done already, and is not done twice.
-            self.reply.sent = 0;
+            self.reply.again();
             return;
         }
-        let answer = self.answer(now, request, app);
+        if let Some(answer) = self.answer(now, request, app) {
+            self.reply(session, sequence, answer);
+        }
+    }
+
+    fn reply(&mut self, session: u32, sequence: u16, answer: Result<Answer, Refusal>) {
         self.reply.set(&FromBridge::Reply(Reply {
             session,
             sequence,
@@ -197,29 +195,55 @@ impl<S: Read + ReadReady + Write> Server<S> {
         self.answered = Some((session, sequence));
     }
 
-    fn answer<P, G, R, F, const X: usize>(
+    /// The next piece of a request that takes longer than a poll. Its host is waiting, so its session does not end.
+    fn go_on<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) {
+        let Some((mut slow, session, sequence)) = self.slow.take() else {
+            return;
+        };
+        if let Some(own) = &mut self.session {
+            own.heard = now;
+        }
+        match slow.step(app.store_mut()) {
+            None => self.slow = Some((slow, session, sequence)),
+            Some(answer) => self.reply(session, sequence, answer),
+        }
+    }
+
+    /// The answer to a request; `None` when it comes later.
+    fn answer<A: Controls<X>, const X: usize>(
         &mut self,
         now: Instant,
         request: &Request<'_>,
-        app: &mut App<P, G, R, F, X>,
-    ) -> Result<Answer, Refusal>
-    where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+        app: &mut A,
+    ) -> Option<Result<Answer, Refusal>> {
         if let Call::Hello { version } = &request.call {
-            return self.hello(now, request.session, *version, app);
+            return Some(self.hello(now, request.session, *version, app));
         }
         match &mut self.session {
             Some(session) if session.id == request.session => session.heard = now,
-            _ => return Err(Refusal::NoSession),
+            _ => return Some(Err(Refusal::NoSession)),
         }
-        match &request.call {
-            Call::Hello { .. } | Call::Status => Ok(Answer::Status(status(app))),
+        let slow = match &request.call {
+            Call::Slots => Slow::Read(Reading::new()),
+            Call::WeightsCommit => Slow::Commit,
+            Call::SelectSlot { slot } => match app.store_mut().select(usize::from(*slot)) {
+                Ok(()) => Slow::Read(Reading::new()),
+                Err(error) => return Some(Err(Refusal::Store(error))),
+            },
+            call => return Some(self.answer_at_once(now, call, app)),
+        };
+        self.slow = Some((slow, request.session, request.sequence));
+        None
+    }
+
+    fn answer_at_once<A: Controls<X>, const X: usize>(
+        &mut self,
+        now: Instant,
+        call: &Call<'_>,
+        app: &mut A,
+    ) -> Result<Answer, Refusal> {
+        match call {
             Call::Counters => Ok(Answer::Counters(self.counters(app))),
-            Call::Slots => Ok(Answer::Slots(slots(app.store()))),
             Call::WeightsBegin { length, crc } => self.begin(*length, *crc, app.store_mut()),
             Call::WeightsChunk { offset, bytes } => {
                 let store = app.store_mut();
@@ -228,16 +252,9 @@ impl<S: Read + ReadReady + Write> Server<S> {
                     .map_err(Refusal::Store)?;
                 Ok(received(store))
             }
-            Call::WeightsCommit => self.commit(app.store_mut()),
             Call::WeightsAbort => {
                 app.store_mut().abort();
                 Ok(Answer::Done)
-            }
-            Call::SelectSlot { slot } => {
-                app.store_mut()
-                    .select(usize::from(*slot))
-                    .map_err(Refusal::Store)?;
-                Ok(Answer::Slots(slots(app.store())))
             }
             Call::ConfigurationGet => Ok(Answer::Configuration(app.config().settings().into())),
             Call::ConfigurationSet(configuration) => configure(configuration, app),
@@ -259,22 +276,22 @@ impl<S: Read + ReadReady + Write> Server<S> {
                 self.rebooting = true;
                 Ok(Answer::Done)
             }
+            // Hello and the slow ones were answered by the caller.
+            Call::Status
+            | Call::Hello { .. }
+            | Call::Slots
+            | Call::WeightsCommit
+            | Call::SelectSlot { .. } => Ok(Answer::Status(status(app))),
         }
     }
 
-    fn hello<P, G, R, F, const X: usize>(
+    fn hello<A: Controls<X>, const X: usize>(
         &mut self,
         now: Instant,
         id: u32,
         version: u16,
-        app: &App<P, G, R, F, X>,
-    ) -> Result<Answer, Refusal>
-    where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+        app: &A,
+    ) -> Result<Answer, Refusal> {
         if version != VERSION {
             return Err(Refusal::Version { bridge: VERSION });
         }
@@ -327,11 +344,6 @@ impl<S: Read + ReadReady + Write> Server<S> {
         Ok(received(store))
     }
 
-    fn commit<F: Slot>(&mut self, store: &mut WeightsStore<F>) -> Result<Answer, Refusal> {
-        store.commit().map_err(Refusal::Store)?;
-        Ok(Answer::Slots(slots(store)))
-    }
-
     fn set_telemetry(&mut self, now: Instant, period_ms: u16) -> Result<Answer, Refusal> {
         self.telemetry = match period_ms {
             0 => None,
@@ -348,13 +360,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         Ok(Answer::Done)
     }
 
-    fn take_sample<P, G, R, F, const X: usize>(&mut self, now: Instant, app: &App<P, G, R, F, X>)
-    where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+    fn take_sample<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &A) {
         let Some(telemetry) = &mut self.telemetry else {
             return;
         };
@@ -387,13 +393,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         }));
     }
 
-    fn counters<P, G, R, F, const X: usize>(&self, app: &App<P, G, R, F, X>) -> Counters
-    where
-        P: Platform,
-        G: Read + ReadReady + Write,
-        R: Gripper<X>,
-        F: Slot,
-    {
+    fn counters<A: Controls<X>, const X: usize>(&self, app: &A) -> Counters {
         let seen = app.telemetry();
         let host = self.decoder.counters();
         Counters {
@@ -411,68 +411,14 @@ impl<S: Read + ReadReady + Write> Server<S> {
             faults: seen.counters.faults,
             host_frames: [host.good, host.crc, host.coding, host.oversized],
             host_malformed: self.malformed,
-            bytes_lost: self.bytes_lost,
+            bytes_lost: self.board.bytes_lost,
+            stack_used: self.board.stack_used,
         }
-    }
-}
-
-impl Outgoing {
-    const EMPTY: Self = Self {
-        bytes: [0; MAX_FRAME],
-        sent: 0,
-        length: 0,
-    };
-
-    fn set(&mut self, message: &FromBridge) {
-        self.sent = 0;
-        // Every message fits (a test holds the largest against MAX_MESSAGE); one that did not would be a lost reply.
-        self.length = self.frame(message).unwrap_or(0);
-    }
-
-    fn frame(&mut self, message: &FromBridge) -> Option<usize> {
-        let mut scratch = [0; frame::SCRATCH];
-        let room = scratch.get_mut(..MAX_MESSAGE)?;
-        let length = postcard::to_slice(message, room).ok()?.len();
-        frame::encode(&mut scratch, length, &mut self.bytes)
-            .ok()
-            .map(<[u8]>::len)
-    }
-
-    /// Sends what the port takes; whether something is left.
-    fn send(&mut self, port: &mut impl Write) -> bool {
-        while let Some(rest) = self
-            .bytes
-            .get(self.sent..self.length)
-            .filter(|rest| !rest.is_empty())
-        {
-            match port.write(rest) {
-                Ok(count) if count > 0 => self.sent += count,
-                // No room now, or a port that fails: the frame waits; a host that misses its reply asks again.
-                _ => return true,
-            }
-        }
-        false
-    }
-
-    fn is_busy(&self) -> bool {
-        self.sent < self.length
-    }
-
-    fn is_begun(&self) -> bool {
-        self.sent > 0 && self.is_busy()
     }
 }
 
 /// The app, if its clutch is open.
-fn idle<P, G, R, F, const X: usize>(
-    app: &mut App<P, G, R, F, X>,
-) -> Result<&mut App<P, G, R, F, X>, Refusal>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
+fn idle<A: Controls<X>, const X: usize>(app: &mut A) -> Result<&mut A, Refusal> {
     if app.is_engaged() {
         Err(Refusal::Engaged)
     } else {
@@ -480,33 +426,14 @@ where
     }
 }
 
-fn configure<P, G, R, F, const X: usize>(
+fn configure<A: Controls<X>, const X: usize>(
     configuration: &Configuration,
-    app: &mut App<P, G, R, F, X>,
-) -> Result<Answer, Refusal>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
+    app: &mut A,
+) -> Result<Answer, Refusal> {
     let current = *app.config().settings();
-    let config = Config::new(configuration.onto(current)).map_err(refused_setting)?;
+    let config = Config::new(configuration.onto(current)).map_err(configuration::refused)?;
     app.set_config(config).map_err(|_| Refusal::Engaged)?;
     Ok(Answer::Configuration(app.config().settings().into()))
-}
-
-fn refused_setting(error: config::Error) -> Refusal {
-    let key = SETTING_NAMES
-        .iter()
-        .position(|&name| name == error.key)
-        .unwrap_or(SETTING_NAMES.len());
-    Refusal::Configuration {
-        key: key as u8,
-        value: error.value,
-        least: error.least,
-        greatest: error.greatest,
-    }
 }
 
 fn received<F: Slot>(store: &WeightsStore<F>) -> Answer {
@@ -515,13 +442,7 @@ fn received<F: Slot>(store: &WeightsStore<F>) -> Answer {
     }
 }
 
-fn status<P, G, R, F, const X: usize>(app: &App<P, G, R, F, X>) -> Status
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
+fn status<A: Controls<X>, const X: usize>(app: &A) -> Status {
     let seen = app.telemetry();
     Status {
         now_us: seen.now.as_ticks(),
@@ -542,78 +463,5 @@ where
             .store()
             .progress()
             .map(|(there, announced)| (there as u32, announced as u32)),
-    }
-}
-
-fn slots<F: Slot>(store: &WeightsStore<F>) -> Slots {
-    let mut contents = [SlotContents::Empty; 2];
-    let known = store.contents().iter().zip(store.slots());
-    for (place, (held, slot)) in contents.iter_mut().zip(known) {
-        *place = match held {
-            Contents::Empty => SlotContents::Empty,
-            Contents::Damaged(_) => SlotContents::Damaged,
-            Contents::Whole(image) => {
-                let length = image.checked.header().length;
-                let bytes = slot.mapped().get(..length).unwrap_or_default();
-                SlotContents::Image {
-                    model_id: image.checked.header().meta.model_id,
-                    version: image.checked.header().meta.version,
-                    length: length as u32,
-                    crc: frame::CRC32.checksum(bytes),
-                }
-            }
-        };
-    }
-    Slots {
-        active: store.active().map(|(slot, _)| slot as u8),
-        contents,
-    }
-}
-
-/// The first [`AXES`] of a value for each axis.
-fn per_axis<T: Copy>(values: &[T]) -> PerAxis<T> {
-    values.iter().take(AXES).copied().collect()
-}
-
-impl<const X: usize> From<&Settings<X>> for Configuration {
-    fn from(settings: &Settings<X>) -> Self {
-        Self {
-            side: settings.side,
-            filter: settings.filter,
-            fresh_frames: settings.fresh_frames,
-            blend_ms: settings.blend_ms,
-            rate: settings.rate,
-            lead: settings.lead,
-            safe_action: settings.safe_action,
-            open_rate: settings.open_rate,
-            speed: per_axis(&settings.speed),
-            force: per_axis(&settings.force),
-            heading_is_relative: settings.heading_is_relative,
-        }
-    }
-}
-
-impl Configuration {
-    /// These settings over `base`, which keeps the axes that this configuration does not name.
-    pub fn onto<const X: usize>(&self, base: Settings<X>) -> Settings<X> {
-        let mut settings = Settings {
-            side: self.side,
-            filter: self.filter,
-            fresh_frames: self.fresh_frames,
-            blend_ms: self.blend_ms,
-            rate: self.rate,
-            lead: self.lead,
-            safe_action: self.safe_action,
-            open_rate: self.open_rate,
-            heading_is_relative: self.heading_is_relative,
-            ..base
-        };
-        for (to, from) in settings.speed.iter_mut().zip(&self.speed) {
-            *to = *from;
-        }
-        for (to, from) in settings.force.iter_mut().zip(&self.force) {
-            *to = *from;
-        }
-        settings
     }
 }

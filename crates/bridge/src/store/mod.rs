@@ -6,7 +6,7 @@
 //!
 //! 1. erase the other slot's records, read back that they are gone: from here on it does not count, whatever it holds;
 //! 2. erase and program the image, block by block as its bytes come, each read back;
-//! 3. check the whole image in place (`hae::image::parse`: header, CRC, every weight), its shape, order and version;
+//! 3. check the whole image in place (`hae::image::Verifier`: header, CRC, every weight), its shape, order and version;
 //! 4. program one record, read it back: from here on the new image is active.
 //!
 //! A cut before 4 leaves the active slot untouched; a cut inside 4 leaves a record that is whole, and then the image is
@@ -23,9 +23,9 @@ pub use error::Error;
 
 use crate::platform::Slot;
 use embedded_storage::nor_flash::NorFlashError;
-use hae::image::{Checked, JointOrder};
+use hae::image::{Checked, JointOrder, Verifier};
 use record::Record;
-use slot::{check, fits, inspect, is_erased, newest_record, records, stride};
+use slot::{fits, fits_bridge, inspect, is_erased, newest_record, records, stride};
 
 /// Bytes programmed at once, at most.
 pub const PAGE: usize = 256;
@@ -60,13 +60,24 @@ pub enum Contents {
 }
 
 /// An image on its way into a slot.
-#[derive(Debug)]
 struct Write {
     slot: usize,
     length: usize,
     /// Bytes in flash; the page buffer comes after.
     programmed: usize,
     page: heapless::Vec<u8, PAGE>,
+    /// The check before the commit, once it has begun.
+    check: Option<Verifier>,
+}
+
+impl core::fmt::Debug for Write {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("Write")
+            .field("slot", &self.slot)
+            .field("length", &self.length)
+            .field("programmed", &self.programmed)
+            .finish_non_exhaustive()
+    }
 }
 
 impl Write {
@@ -194,6 +205,7 @@ impl<F: Slot> WeightsStore<F> {
             length,
             programmed: 0,
             page: heapless::Vec::new(),
+            check: None,
         });
         Ok(())
     }
@@ -224,6 +236,13 @@ impl<F: Slot> WeightsStore<F> {
 
     /// Makes the image active, after checking all of it. An error gives it up.
     pub fn commit(&mut self) -> Result<(), Error> {
+        while !self.commit_step()? {}
+        Ok(())
+    }
+
+    /// [`WeightsStore::commit`] in pieces for a loop with a time limit: true when it is done. A piece programs at most a page
+    /// and checks about 1 KB. An abort between two pieces ends the commit.
+    pub fn commit_step(&mut self) -> Result<bool, Error> {
         self.check_unlocked()?;
         let write = self.write.as_ref().ok_or(Error::NotBegun)?;
         if write.taken() < write.length {
@@ -233,8 +252,10 @@ impl<F: Slot> WeightsStore<F> {
             });
         }
         let (slot, length) = (write.slot, write.length);
-        let result = self.finish(slot, length);
-        self.write = None;
+        let result = self.finish_step(slot, length);
+        if !matches!(result, Ok(false)) {
+            self.write = None;
+        }
         result
     }
 
@@ -333,15 +354,26 @@ impl<F: Slot> WeightsStore<F> {
         self.program(slot, at, &page)
     }
 
-    fn finish(&mut self, slot: usize, length: usize) -> Result<(), Error> {
-        if self
-            .write
-            .as_ref()
-            .is_some_and(|write| !write.page.is_empty())
-        {
+    fn finish_step(&mut self, slot: usize, length: usize) -> Result<bool, Error> {
+        let write = self.write.as_mut().ok_or(Error::NotBegun)?;
+        if !write.page.is_empty() {
             self.program_page()?;
+            return Ok(false);
         }
-        let checked = check(self.slot(slot).mapped(), &self.expected)?;
+        let check = write.check.take();
+        let bytes = self.slot(slot).mapped();
+        let mut check = match check {
+            Some(check) => check,
+            None => Verifier::new(bytes).map_err(Error::Image)?,
+        };
+        let checked = check.step(bytes).map_err(Error::Image)?;
+        let Some(checked) = checked else {
+            if let Some(write) = &mut self.write {
+                write.check = Some(check);
+            }
+            return Ok(false);
+        };
+        fits_bridge(&checked, &self.expected)?;
         if checked.length != length {
             return Err(Error::Length {
                 found: checked.length,
@@ -357,7 +389,8 @@ impl<F: Slot> WeightsStore<F> {
             });
         }
         let (start, _) = records(self.slot(slot));
-        self.record(slot, start, checked)
+        self.record(slot, start, checked)?;
+        Ok(true)
     }
 
     /// Programs a record for the image in `slot` and makes it active.

@@ -34,12 +34,21 @@ pub(super) fn records<F: Slot>(slot: &F) -> (usize, usize) {
 }
 
 pub(super) fn is_erased(bytes: Option<&[u8]>) -> bool {
-    bytes.is_some_and(|bytes| bytes.iter().all(|&byte| byte == 0xFF))
+    bytes.is_some_and(|bytes| {
+        let (words, rest) = bytes.as_chunks::<4>();
+        words.iter().all(|word| *word == [0xFF; 4]) && rest.iter().all(|&byte| byte == 0xFF)
+    })
 }
 
 /// The full check of an image at the start of `bytes`.
-pub(super) fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, Error> {
+fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, Error> {
     let checked = image::parse(bytes).map_err(Error::Image)?;
+    fits_bridge(&checked, expected)?;
+    Ok(checked)
+}
+
+/// Whether a sound image is one for this bridge.
+pub(super) fn fits_bridge(checked: &Checked, expected: &Expected) -> Result<(), Error> {
     let found = [checked.inputs, checked.hidden, checked.outputs];
     if found != expected.shape {
         return Err(Error::Shape {
@@ -53,7 +62,7 @@ pub(super) fn check(bytes: &[u8], expected: &Expected) -> Result<Checked, Error>
             expected: expected.joint_order,
         });
     }
-    Ok(checked)
+    Ok(())
 }
 
 /// The slot's valid record with the highest sequence.

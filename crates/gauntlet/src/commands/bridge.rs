@@ -95,6 +95,12 @@ fn status(at: &BridgeAt) -> Result<()> {
         counters.gripper_errors,
         counters.bytes_lost
     ));
+    if counters.stack_used > 0 {
+        tell.say(format_args!(
+            "stack      {} bytes at most so far",
+            counters.stack_used
+        ));
+    }
     Ok(())
 }
 

@@ -2,7 +2,6 @@
 
 use super::{BusScanner, Frame};
 use crate::bus::{Batch, Bus, Error, Reply, Transaction};
-use crate::hand::SEGMENT_COUNT;
 use crate::imu::bringup::{BringUp, Next};
 use crate::imu::{self, SAMPLE_BYTES, register};
 use crate::timing::after;
@@ -317,11 +316,12 @@ impl<B: Bus> BusScanner<B> {
         let Phase::Reading { next, began } = self.phase else {
             return false;
         };
-        let Some(k) = (next..SEGMENT_COUNT).find(|&k| self.sensors[k].is_running()) else {
+        let mut left = self.sensors.iter().enumerate().skip(next);
+        let Some((k, sensor)) = left.find(|(_, sensor)| sensor.is_running()) else {
             return false;
         };
         self.phase = Phase::Reading { next: k + 1, began };
-        let plain = self.sensors[k].reads_plain();
+        let plain = sensor.reads_plain();
         let mut batch = Batch::new();
         let selects = self.mux.selected() != Some(imu::channel(k));
         let started = sample_batch(k, plain)
@@ -340,7 +340,11 @@ impl<B: Bus> BusScanner<B> {
                     selects,
                 })
             }
-            Err(cause) => self.sensors[k].miss(cause, now, &mut self.counters),
+            Err(cause) => {
+                if let Some(sensor) = self.sensors.get_mut(k) {
+                    sensor.miss(cause, now, &mut self.counters);
+                }
+            }
         }
         true
     }
@@ -350,7 +354,7 @@ impl<B: Bus> BusScanner<B> {
         let Phase::Reading { next, began } = self.phase else {
             return None;
         };
-        if (next..SEGMENT_COUNT).any(|k| self.sensors[k].is_running()) {
+        if self.sensors.iter().skip(next).any(Sensor::is_running) {
             return None;
         }
         self.phase = Phase::Between {
