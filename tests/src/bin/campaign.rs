@@ -24,11 +24,17 @@ fn main() -> ExitCode {
     let words: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = words.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
-        ["powercut"] => powercut(),
+        ["powercut"] => store().and_then(|()| contents()).and_then(|()| kills()),
+        ["powercut", "store"] => store(),
+        ["powercut", "contents"] => contents(),
+        ["powercut", "qemu"] => kills(),
         ["same-bits"] => same_bits(),
         ["measure"] => measure(),
         ["count"] => counts().map(|text| print!("{text}")),
-        _ => Err("usage: campaign powercut | same-bits | measure | count".to_owned()),
+        _ => Err(
+            "usage: campaign powercut [store | contents | qemu] | same-bits | measure | count"
+                .to_owned(),
+        ),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -50,7 +56,8 @@ fn shown<T>(what: &'static str, work: impl FnOnce(&mut dyn FnMut(u64, u64)) -> T
     (result, took.as_secs_f64())
 }
 
-fn powercut() -> Result<(), String> {
+/// Power cuts in the store, on a flash in memory.
+fn store() -> Result<(), String> {
     println!(
         "seed {SEED:#x}; program unit {UNIT} bytes, each a moment to fail before, inside and after"
     );
@@ -76,6 +83,11 @@ fn powercut() -> Result<(), String> {
         power_cuts::random(&mut bench, 3, 100_000, SEED, p)
     });
     println!("{bytes} bytes: 100000 random triples, {cuts} cuts: old or new, 0 lost ({s:.0} s)");
+    Ok(())
+}
+
+/// Anything in the slots.
+fn contents() -> Result<(), String> {
     let (found, s) = shown("slot contents", |p| {
         slot_contents::mutate(10_000_000, SEED, p)
     });
@@ -88,6 +100,11 @@ fn powercut() -> Result<(), String> {
     println!(
         "1000 slot contents under the whole bridge, clutch held: {found:?}; no motion without weights ({s:.0} s)"
     );
+    Ok(())
+}
+
+/// The emulator killed while weights are flashed.
+fn kills() -> Result<(), String> {
     let Some(firmware) = firmware() else {
         return Ok(());
     };
