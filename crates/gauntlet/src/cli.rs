@@ -40,10 +40,12 @@ pub struct Cli {
 pub enum Verb {
     /// Train a map, then drive a virtual gripper with a virtual glove in real time.
     Demo(Demo),
-    /// Learn the map from hand poses to gripper positions.
-    Train(Train),
-    /// Measure how good a trained map is on given poses.
-    Eval(Eval),
+    /// Learn the map from hand poses to gripper positions, or between any two domains.
+    Train(Box<crate::commands::train::Train>),
+    /// Measure how good a trained map is on given poses or samples.
+    Eval(crate::commands::eval::Eval),
+    /// Make the paper's tables and figures, with its numbers beside ours.
+    Reproduce(crate::commands::reproduce::Reproduce),
     /// Make a virtual glove and a virtual gripper behind pseudo-terminals.
     Simulate(Simulate),
     /// Drive a gripper with a glove, through two serial ports.
@@ -115,78 +117,6 @@ impl Default for Demo {
             json: false,
         }
     }
-}
-
-/// How long to train.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Schedule {
-    /// The demo's: under a minute, a little less spread over the gripper's range.
-    Short,
-    /// The paper's 8,000 + 100 L epochs.
-    Paper,
-}
-
-/// Options of `train`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  gauntlet train --poses my_hand.csv --out model.safetensors
-  gauntlet train --poses my_hand.csv --out model.safetensors --schedule paper --seed 7
-  gauntlet train --poses my_hand.csv --out model.safetensors --epochs 500 --json
-
-The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians
-(docs/tool.md lists them). A script answers for the person who would show the hand pose that
-belongs to a gripper pose. 60 % of the rows train, the rest measure the result.")]
-pub struct Train {
-    /// The hand poses to train on.
-    #[arg(long, value_name = "FILE.csv")]
-    pub poses: PathBuf,
-    /// Where the trained model goes.
-    #[arg(long, value_name = "MODEL.safetensors")]
-    pub out: PathBuf,
-    /// How long to train.
-    #[arg(long, value_enum, default_value_t = Schedule::Paper)]
-    pub schedule: Schedule,
-    /// Epochs of the last stage, instead of the schedule's (1 to 1000000).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
-    pub epochs: Option<u32>,
-    /// Reference pairs chosen one after another where they help most (1 to 100).
-    #[arg(long, value_name = "L", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100))]
-    pub pairs: u32,
-    /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
-    #[arg(long)]
-    pub no_start_pairs: bool,
-    /// Seed of everything random: the same seed trains the same map.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
-    /// Print the result as JSON on standard output, and nothing else there.
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Options of `eval`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  gauntlet eval --model model.safetensors --poses other_recording.csv
-  gauntlet eval --model model.safetensors --poses my_hand.csv --json
-
-Mean distortion: how much the map stretches small motions unevenly; lower is smoother.
-Volume occupancy (VO): the share of the gripper's poses that the hand can reach, 0 to 1; 0.9 and more is good.
-d-Knn: how much farther apart neighbours come to lie; over about 16 the map folds somewhere.")]
-pub struct Eval {
-    /// The trained model.
-    #[arg(long, value_name = "MODEL.safetensors")]
-    pub model: PathBuf,
-    /// The hand poses to measure on; best ones the model was not trained on.
-    #[arg(long, value_name = "FILE.csv")]
-    pub poses: PathBuf,
-    /// Seed of the gripper poses that the map is compared with.
-    #[arg(long, value_name = "N", default_value_t = 1)]
-    pub seed: u64,
-    /// Print the result as JSON.
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Options of `simulate`.

@@ -51,24 +51,24 @@ impl Progress {
 
     /// `done` steps are done; `detail` says how it goes.
     pub fn at(&mut self, done: u64, detail: impl FnOnce() -> String) {
+        self.at_with(done, None, detail);
+    }
+
+    /// As [`Progress::at`], with an estimate that knows better than "as fast as so far".
+    pub fn at_with(&mut self, done: u64, left: Option<Duration>, detail: impl FnOnce() -> String) {
+        let left = left.or_else(|| remaining(self.started.elapsed(), done, self.total));
+        let left = left.map_or_else(String::new, |left| {
+            format!(", about {} left", seconds(left))
+        });
         match &mut self.shown {
             Display::Bar(bar) => {
                 bar.set_position(done);
-                bar.set_message(detail());
+                bar.set_message(format!("{}{left}", detail()));
             }
             Display::Lines { last } if last.elapsed() >= LINE_EVERY => {
                 *last = Instant::now();
-                let left = remaining(self.started.elapsed(), done, self.total);
-                note!(
-                    "{}: {done} of {}, {}{}",
-                    self.what,
-                    self.total,
-                    detail(),
-                    left.map_or_else(String::new, |left| format!(
-                        ", about {} left",
-                        seconds(left)
-                    ))
-                );
+                let (what, total) = (self.what, self.total);
+                note!("{what}: {done} of {total}, {}{left}", detail());
             }
             Display::Lines { .. } | Display::Quiet => {}
         }
@@ -80,6 +80,14 @@ impl Progress {
             Display::Bar(bar) => bar.suspend(|| note!("{text}")),
             Display::Lines { .. } => note!("{text}"),
             Display::Quiet => {}
+        }
+    }
+
+    /// Prints with the bar out of the way.
+    pub fn aside(&self, print: impl FnOnce()) {
+        match &self.shown {
+            Display::Bar(bar) => bar.suspend(print),
+            Display::Lines { .. } | Display::Quiet => print(),
         }
     }
 
@@ -103,7 +111,7 @@ impl Drop for Progress {
 fn bar(what: &'static str, total: u64) -> ProgressBar {
     let bar =
         ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(REDRAWS));
-    let template = "{prefix} {bar:30} {percent:>3} %  {elapsed}, {eta} left  {wide_msg}";
+    let template = "{prefix} {bar:30} {percent:>3} %  {elapsed}  {wide_msg}";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.progress_chars("━╸─"));
     }

@@ -4,8 +4,8 @@ use rand::RngExt;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
-use trainer::data::Matrix;
-use trainer::measures::{Coverage, Test, measure};
+use trainer::data::{Matrix, Pairs};
+use trainer::measures::{Coverage, Test, measure, occupancy};
 use trainer::model::{Model, Normalisation};
 
 /// Least volume occupancy of a map worth driving with.
@@ -35,21 +35,23 @@ pub struct Quality {
 impl Quality {
     /// Measures `model` on `frames` (radians, one hand pose a row) against `targets` (counts).
     pub fn of(model: &Model, frames: &Matrix, targets: &Matrix, measured_on: String) -> Self {
-        let measures = measure(
-            &model.f,
-            &Test {
-                inputs: &model.q.apply_all(frames),
-                targets: &model.x.apply_all(targets),
-                coverage: coverage(&model.x),
-                truth: None,
-            },
-        );
-        Self {
-            mean_distortion: measures.distortion,
-            volume_occupancy: measures.occupancy.unwrap_or(0.0),
-            d_knn: measures.dissimilarity,
-            frames: frames.rows,
+        Self::from_measured(&Measured::of(
+            model,
+            (frames, targets),
+            &GRIPPER,
+            None,
             measured_on,
+        ))
+    }
+
+    /// Of measures whose occupancy is known.
+    pub fn from_measured(measured: &Measured) -> Self {
+        Self {
+            mean_distortion: measured.mean_distortion,
+            volume_occupancy: measured.volume_occupancy.unwrap_or(0.0),
+            d_knn: measured.d_knn,
+            frames: measured.samples,
+            measured_on: measured.measured_on.clone(),
         }
     }
 
@@ -67,17 +69,119 @@ impl Quality {
     }
 }
 
-/// The volume of the configuration space in the model's network units.
-fn coverage(x: &Normalisation) -> Coverage {
-    let box_volume: f64 = x
-        .scale
-        .iter()
-        .map(|scale| STROKE / f64::from(*scale).abs())
-        .product();
-    Coverage::Volume {
-        volume: f64::from(gripper::space::VOLUME_FRACTION) * box_volume,
-        dimension: u32::try_from(x.scale.len()).unwrap_or(0),
+/// The gripper's configuration space, counts.
+pub const GRIPPER: Coverage = Coverage::Volume {
+    volume: gripper::space::VOLUME_FRACTION as f64 * STROKE * STROKE * STROKE * STROKE,
+    dimension: 4,
+};
+
+/// The four measures of a map between any two domains.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Measured {
+    /// Sample mean distortion (Eq. 14), network units.
+    pub mean_distortion: f64,
+    /// Share of the targets that are reached (Eq. 16), 0 to 1.
+    pub volume_occupancy: Option<f64>,
+    /// How much farther apart neighbours come to lie (Eq. 17), network units.
+    pub d_knn: f64,
+    /// Mean squared error over the truth's variance (Eq. 18).
+    pub nmse: Option<f64>,
+    /// Why a measure is not there.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown: Vec<&'static str>,
+    /// Input samples measured on.
+    pub samples: usize,
+    /// True pairs measured on.
+    pub true_pairs: usize,
+    /// What those samples are.
+    pub measured_on: String,
+}
+
+impl Measured {
+    /// Measures `model` on input samples against target samples, with what `coverage` says of the target domain, all in the domains'
+    /// units.
+    pub fn of(
+        model: &Model,
+        (inputs, targets): (&Matrix, &Matrix),
+        coverage: &Coverage,
+        truth: Option<&Pairs>,
+        measured_on: String,
+    ) -> Self {
+        let epsilon = coverage.epsilon(inputs.rows);
+        let network_truth = truth.map(|truth| Pairs {
+            inputs: model.q.apply_all(&truth.inputs),
+            targets: model.x.apply_all(&truth.targets),
+        });
+        let scale = uniform_scale(&model.x);
+        let measures = measure(
+            &model.f,
+            &Test {
+                inputs: &model.q.apply_all(inputs),
+                targets: &model.x.apply_all(targets),
+                coverage: match (epsilon, scale) {
+                    (Some(epsilon), Some(scale)) => Coverage::Epsilon(epsilon / (scale * scale)),
+                    _ => Coverage::Unknown,
+                },
+                truth: network_truth.as_ref(),
+            },
+        );
+        // Columns of different scales: distances are those of the target's units, not the network's.
+        let in_units = || {
+            let images = model.map_all(inputs);
+            epsilon.map(|epsilon| occupancy(&lists(&images), &lists(targets), epsilon))
+        };
+        let mut unknown = Vec::new();
+        if epsilon.is_none() {
+            unknown.push(NO_OCCUPANCY);
+        }
+        if truth.is_none() {
+            unknown.push(NO_NMSE);
+        }
+        Self {
+            mean_distortion: measures.distortion,
+            volume_occupancy: measures.occupancy.or_else(in_units),
+            d_knn: measures.dissimilarity,
+            nmse: measures.nmse,
+            unknown,
+            samples: inputs.rows,
+            true_pairs: truth.map_or(0, |truth| truth.inputs.rows),
+            measured_on,
+        }
     }
+
+    /// For a person to read.
+    pub fn lines(&self) -> Vec<String> {
+        let known = |name: &str, value: Option<f64>| match value {
+            Some(value) => format!(", {name} {value:.3}"),
+            None => String::new(),
+        };
+        let mut lines = vec![format!(
+            "mean distortion {:.3}{}, d-Knn {:.3}{}, on {} {}",
+            self.mean_distortion,
+            known("volume occupancy", self.volume_occupancy),
+            self.d_knn,
+            known("NMSE", self.nmse),
+            self.samples,
+            self.measured_on
+        )];
+        lines.extend(self.unknown.iter().map(ToString::to_string));
+        lines
+    }
+}
+
+const NO_OCCUPANCY: &str = "no volume occupancy: it needs the target's volume and dimension (--volume, --dim) or --epsilon";
+const NO_NMSE: &str = "no NMSE: it needs true pairs (--truth)";
+
+fn lists(samples: &Matrix) -> Vec<Vec<f64>> {
+    let list = |row: &[f32]| row.iter().map(|value| f64::from(*value)).collect();
+    samples.iter_rows().map(list).collect()
+}
+
+/// The one scale of all columns.
+fn uniform_scale(units: &Normalisation) -> Option<f64> {
+    let first = *units.scale.first()?;
+    let uniform = units.scale.iter().all(|&scale| scale == first);
+    uniform.then_some(f64::from(first))
 }
 
 /// Gripper poses spread evenly over the configuration space, counts: those to train on.
@@ -105,9 +209,10 @@ mod tests {
 
     #[test]
     fn the_gripper_s_normalisation_gives_the_paper_s_volume() {
-        let found = coverage(&Normalisation::gripper(4)).epsilon(254);
+        let scale = uniform_scale(&Normalisation::gripper(4)).unwrap();
+        let found = GRIPPER.epsilon(254).unwrap() / (scale * scale);
         let expected = Coverage::GRIPPER.epsilon(254);
-        assert!((found.unwrap() / expected.unwrap() - 1.0).abs() < 1e-5);
+        assert!((found / expected.unwrap() - 1.0).abs() < 1e-5);
     }
 
     #[test]

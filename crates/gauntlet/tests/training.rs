@@ -93,3 +93,96 @@ fn ports_are_listed_as_json() {
     let said = json(&run(&["ports", "--json"]));
     assert!(said["ports"].is_array());
 }
+
+#[test]
+fn table_3_s_poses_are_named_and_a_file_of_pairs_is_taken() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let train = |words: &[&str]| {
+        let mut all = vec![
+            "train",
+            "--poses",
+            poses,
+            "--out",
+            out,
+            "--schedule",
+            "fast",
+            "--epochs",
+            "5",
+        ];
+        all.extend(words);
+        run(&all)
+    };
+    let output = train(&["--pairs", "table3:8"]);
+    assert_eq!(
+        output.status.code(),
+        Some(0),
+        "{}",
+        support::text(&output.stderr)
+    );
+    let said = support::text(&output.stdout);
+    for name in ["pinch close", "finger C, A open"] {
+        assert!(said.contains(name), "{said}");
+    }
+    assert!(
+        !said.contains("all fingers close"),
+        "eight poses, not ten: {said}"
+    );
+
+    let header = format!(
+        "{},finger_a,finger_b,finger_c,scissor",
+        support::JOINTS.join(",")
+    );
+    let row = |counts: &str| format!("{},{counts}", ["0.1"; 25].join(","));
+    let file = folder.path().join("pairs.csv");
+    std::fs::write(&file, format!("{header}\n{}\n", row("0,0,255,130"))).unwrap();
+    let file_word = file.to_str().unwrap();
+    assert_eq!(
+        json(&train(&["--pairs-file", file_word, "--json"]))["pairs"],
+        1
+    );
+    // Scissor at a pinch and fingers A and B closed: they would meet.
+    std::fs::write(
+        &file,
+        format!(
+            "{header}\n{}\n{}\n",
+            row("0,0,255,130"),
+            row("255,255,0,255")
+        ),
+    )
+    .unwrap();
+    let said = refusal(&train(&["--pairs-file", file_word]), 1);
+    assert!(
+        said.contains("pairs.csv: pair 2") && said.contains("255.0"),
+        "{said}"
+    );
+    assert_eq!(train(&["--pairs", "random"]).status.code(), Some(2));
+    assert_eq!(train(&["--pairs", "table3:11"]).status.code(), Some(2));
+}
+
+#[test]
+fn a_hand_s_own_training_file_is_not_held_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let words = [
+        "train",
+        "--poses",
+        poses,
+        "--out",
+        out,
+        "--schedule",
+        "fast",
+        "--epochs",
+        "5",
+        "--pairs",
+        "1",
+    ];
+    assert_eq!(run(&words).status.code(), Some(0));
+    let output = run(&["eval", "--model", out, "--poses", poses, "--json"]);
+    assert!(support::text(&output.stderr).contains("not held out"));
+    assert_eq!(json(&output)["held_out"], false);
+}

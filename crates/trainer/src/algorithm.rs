@@ -191,17 +191,19 @@ impl Trainer {
             self.step();
             clock.tick(self);
             let every = self.settings.report_every.max(1);
-            if self.epoch.is_multiple_of(every) || self.epoch == self.total() {
-                if !self.engine.parameters().iter().all(|p| p.is_finite()) {
-                    return Err(Error::Diverged { epoch: self.epoch });
-                }
-                self.report(&clock, progress, None)?;
+            let is_report_due = self.epoch.is_multiple_of(every) || self.epoch == self.total();
+            if is_report_due && !self.engine.parameters().iter().all(|p| p.is_finite()) {
+                return Err(Error::Diverged { epoch: self.epoch });
             }
+            // Before the report: whoever stops the training there hears of a fold first.
             if self.is_look_due() {
                 for warning in self.look_at_map() {
                     self.report(&clock, progress, Some(warning))?;
                 }
                 clock.rest();
+            }
+            if is_report_due {
+                self.report(&clock, progress, None)?;
             }
         }
         Ok(Trained {

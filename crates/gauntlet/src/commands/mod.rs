@@ -3,15 +3,16 @@
 mod bridge;
 mod demo;
 pub mod doctor;
-mod eval;
+pub mod eval;
 pub mod export;
 mod flash;
 pub mod gripper;
 mod on_chip;
 mod ports;
+pub mod reproduce;
 mod simulate;
 mod teleop;
-mod train;
+pub mod train;
 
 use anyhow::Result;
 
@@ -35,6 +36,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Demo(options) => demo::run(&options, &interrupt()?),
         Verb::Train(options) => train::run(&options, &interrupt()?),
         Verb::Eval(options) => eval::run(&options),
+        Verb::Reproduce(options) => reproduce::run(&options, &interrupt()?),
         Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
         Verb::Teleop(options) => teleop::run(&options, &interrupt()?),
         Verb::Export(options) => export::run(&options),

@@ -22,6 +22,22 @@ pub struct Pairs {
     pub targets: Matrix,
 }
 
+impl Pairs {
+    /// `count` of these pairs at equal distances around their ring: number round(i·M/`count`) of M, for i = 1 … `count`, the last
+    /// being the first of the ring. Nothing from no pairs.
+    #[must_use]
+    pub fn spaced(&self, count: usize) -> Self {
+        let ring = self.inputs.rows.max(1);
+        let places: Vec<usize> = (1..=count)
+            .map(|i| (2 * i * ring + count) / (2 * count) % ring)
+            .collect();
+        Self {
+            inputs: self.inputs.select(&places),
+            targets: self.targets.select(&places),
+        }
+    }
+}
+
 /// Reads poses: the columns `joint_names` (radians), and `time_s` if there. Needs at least one frame.
 ///
 /// # Errors

@@ -1,13 +1,15 @@
-//! Drawings of shapes, maps and curves as SVG, each with its data as CSV beside it. Drawings of hands and grippers are made elsewhere:
-//! this crate knows no hand kinematics.
+//! Drawings of shapes, maps and curves as SVG, each with its data as CSV beside it. Hands and grippers come as ready lines
+//! ([`sketches`]): this crate knows no hand kinematics.
 
 mod chart;
 mod panel;
 mod pca;
+mod sketch;
 
 pub use chart::{Chart, Curve, charts};
 pub use panel::{Panel, panels};
 pub use pca::Principal;
+pub use sketch::{Sketch, Stroke, sketches};
 
 use std::path::{Path, PathBuf};
 

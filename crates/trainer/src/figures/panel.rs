@@ -17,6 +17,10 @@ pub struct Panel {
     pub grid: Vec<[usize; 2]>,
     /// A value 0 to 1 a point, drawn as colour from blue to red.
     pub heat: Vec<f64>,
+    /// What the colours mean, from the first to the last; below the drawing.
+    pub heat_label: String,
+    /// Points of a closed line behind the grid.
+    pub outline: Matrix,
     /// Dots behind the grid.
     pub cloud: Matrix,
     /// Points with a number beside them, from 1 on.
@@ -56,6 +60,7 @@ fn data(rows: &[Vec<Panel>]) -> String {
     for panel in rows.iter().flatten() {
         for (kind, samples) in [
             ("point", &panel.points),
+            ("outline", &panel.outline),
             ("cloud", &panel.cloud),
             ("mark", &panel.marks),
             ("path", &panel.path),
@@ -85,18 +90,23 @@ fn draw<'a>(area: &Area<'a>, panel: &Panel) -> Drawn<'a> {
     let flat = |samples: &Matrix| samples.iter_rows().map(seen).collect::<Vec<_>>();
     let (points, cloud) = (flat(&panel.points), flat(&panel.cloud));
     let (marks, path) = (flat(&panel.marks), flat(&panel.path));
-    let all = || points.iter().chain(&cloud).chain(&marks).chain(&path);
+    let mut outline = flat(&panel.outline);
+    outline.extend(outline.first().copied());
+    let lines = || outline.iter().chain(&path);
+    let all = || points.iter().chain(&cloud).chain(&marks).chain(lines());
     let (left, right) = range(all().map(|p| p.0));
     let (low, high) = range(all().map(|p| p.1));
     // Equal scales on both axes: a fold or a stretch must look like one.
     let half = 0.5 * (right - left).max(high - low);
     let (x, y) = (0.5 * (left + right), 0.5 * (low + high));
     let mut context = ChartBuilder::on(area)
-        .caption(&panel.title, ("sans-serif", 15))
+        .caption(&panel.title, ("sans-serif", 14))
         .margin(6)
+        .margin_bottom(if panel.heat_label.is_empty() { 6 } else { 22 })
         .build_cartesian_2d(x - half..x + half, y - half..y + half)?;
     let grey = BLACK.mix(0.25);
     context.draw_series(cloud.iter().map(|&p| Circle::new(p, 1, grey.filled())))?;
+    context.draw_series(LineSeries::new(outline, BLACK.mix(0.45).stroke_width(1)))?;
     for [from, to] in edges(&panel.grid) {
         let colour = match (panel.heat.get(from), panel.heat.get(to)) {
             (Some(a), Some(b)) => heat(0.5 * (a + b)),
@@ -122,7 +132,27 @@ fn draw<'a>(area: &Area<'a>, panel: &Panel) -> Drawn<'a> {
         let style = ("sans-serif", 16).into_font().color(&red);
         EmptyElement::at(p) + Text::new((i + 1).to_string(), (6, -14), style)
     }))?;
-    Ok(())
+    if panel.heat_label.is_empty() {
+        return Ok(());
+    }
+    scale(area, &panel.heat_label)
+}
+
+/// The colours from first to last, and what they mean.
+fn scale<'a>(area: &Area<'a>, label: &str) -> Drawn<'a> {
+    const STEPS: i32 = 40;
+    let (left, low) = (12, SIZE.1 as i32 - 16);
+    for step in 0..STEPS {
+        let colour = heat(f64::from(step) / f64::from(STEPS - 1));
+        let corners = [(left + 2 * step, low), (left + 2 * step + 2, low + 9)];
+        area.draw(&Rectangle::new(corners, colour.filled()))?;
+    }
+    let style = ("sans-serif", 12).into_font().color(&BLACK);
+    area.draw(&Text::new(
+        label.to_owned(),
+        (left + 2 * STEPS + 8, low - 2),
+        style,
+    ))
 }
 
 /// Neighbours on the grid, as indices of points.

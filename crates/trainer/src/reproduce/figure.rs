@@ -2,7 +2,7 @@
 //! pairs (4, 5, 10), the heat maps of Figure 6, the principal components of Figure 13. Drawn by [`crate::figures`].
 
 use super::table::number;
-use super::{Cell, Error, Kept, Laboratory, Row, Source, paper};
+use super::{Cell, Error, Kept, Laboratory, Row, Source, Store, Watch, paper};
 use crate::data::Matrix;
 use crate::figures::{Chart, Curve, Panel, Principal};
 use crate::measures::{NEIGHBOURS, dissimilarities};
@@ -24,17 +24,20 @@ pub fn shapes(laboratory: &Laboratory) -> Result<Vec<Vec<Panel>>, Error> {
         let domains = laboratory.shape(pair)?;
         let matched = domains.boundary.inputs.rows;
         let ten: Vec<usize> = (0..10).map(|i| i * matched / 10).collect();
-        let panel = |title: String, points: &Matrix, marks: &Matrix| Panel {
+        let panel = |title: String, points: &Matrix, outline: &Matrix| Panel {
             title,
             points: points.clone(),
             grid: domains.grid.clone(),
-            marks: marks.select(&ten),
+            outline: outline.clone(),
+            marks: outline.select(&ten),
             ..Panel::default()
         };
         let (truth, boundary) = (&domains.truth, &domains.boundary);
-        let title = format!("{} input", pair.name());
+        let words = pair.description();
+        let (from, to) = words.split_once(" to ").unwrap_or((words, words));
+        let title = format!("{} input: {from}", pair.name());
         inputs.push(panel(title, &truth.inputs, &boundary.inputs));
-        let title = pair.description().to_owned();
+        let title = format!("{} target: {to}", pair.name());
         targets.push(panel(title, &truth.targets, &boundary.targets));
     }
     Ok(vec![inputs, targets])
@@ -45,15 +48,15 @@ pub fn shapes(laboratory: &Laboratory) -> Result<Vec<Vec<Panel>>, Error> {
 /// # Errors
 /// [`Error`].
 pub fn snapshots(
-    laboratory: &Laboratory,
+    (laboratory, store): (&Laboratory, &Store),
     cell: &Cell,
-    stop: &dyn Fn() -> bool,
+    watch: &dyn Watch,
 ) -> Result<Vec<Panel>, Error> {
     let Source::Shape(pair) = cell.source else {
         return Err(Error::NoOutline(cell.slug()));
     };
     let domains = laboratory.shape(pair)?;
-    let snapshots = laboratory.stages(cell, stop)?;
+    let snapshots = store.stages(laboratory, cell, watch)?;
     let panels = snapshots
         .into_iter()
         .enumerate()
@@ -61,6 +64,7 @@ pub fn snapshots(
             title: format!("{}, session {}", pair.name(), stage + 1),
             points: image(&f, &domains.truth.inputs),
             grid: domains.grid.clone(),
+            outline: domains.boundary.targets.clone(),
             marks: pairs.targets,
             ..Panel::default()
         });
@@ -73,6 +77,10 @@ pub fn snapshots(
 /// [`Error`].
 pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Panel, Error> {
     let prepared = laboratory.prepare(cell)?;
+    let outline = match cell.source {
+        Source::Shape(pair) => laboratory.shape(pair)?.boundary.targets.clone(),
+        Source::Generated | Source::Recorded => Matrix::default(),
+    };
     let images = image(f, &prepared.test);
     let lists = |samples: &Matrix| -> Vec<Vec<f64>> {
         let rows = samples.iter_rows();
@@ -83,14 +91,56 @@ pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Pa
     Ok(Panel {
         title: format!(
             "{} {}, seed {}",
-            cell.source.name(),
+            cell.source.title(),
             cell.row.title(),
             cell.seed
         ),
         points: images,
+        outline,
         heat: each.iter().map(|d| d.min(HEAT_CAP) / HEAT_CAP).collect(),
+        heat_label: format!("d-Knn, 0 to {HEAT_CAP:.0} and more"),
         ..Panel::default()
     })
+}
+
+/// The share of the map's image that lies the wrong way round, 0 to 1, by area over the grid's squares: 0 for a right map, 1 for one
+/// that is mirrored as a whole, between for folds and twists. For targets in the plane.
+///
+/// # Errors
+/// [`Error`].
+pub fn fold_share(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<f64, Error> {
+    let Source::Shape(pair) = cell.source else {
+        return Err(Error::NoOutline(cell.slug()));
+    };
+    let domains = laboratory.shape(pair)?;
+    let images = image(f, &domains.truth.inputs);
+    let places: std::collections::BTreeMap<[usize; 2], usize> = (domains.grid.iter().enumerate())
+        .map(|(i, &g)| (g, i))
+        .collect();
+    let area = |samples: &Matrix, [a, b, c]: [usize; 3]| {
+        let at = |i: usize, k: usize| f64::from(samples.row(i)[k]);
+        (at(b, 0) - at(a, 0)) * (at(c, 1) - at(a, 1))
+            - (at(b, 1) - at(a, 1)) * (at(c, 0) - at(a, 0))
+    };
+    let (mut flipped, mut whole) = (0.0, 0.0);
+    for (from, &[column, row]) in domains.grid.iter().enumerate() {
+        let neighbours = (
+            places.get(&[column + 1, row]),
+            places.get(&[column, row + 1]),
+        );
+        if let (Some(&right), Some(&up)) = neighbours {
+            let corners = [from, right, up];
+            let (found, true_one) = (
+                area(&images, corners),
+                area(&domains.truth.targets, corners),
+            );
+            whole += found.abs();
+            if found * true_one < 0.0 {
+                flipped += found.abs();
+            }
+        }
+    }
+    Ok(if whole > 0.0 { flipped / whole } else { 0.0 })
 }
 
 /// Figures 2, 11 and 14 to 16: the measures as they stood on the way, mean over the repetitions, a curve a row.
@@ -177,10 +227,10 @@ fn charts(source: Source, points: impl Fn(Row, usize) -> Vec<(f64, f64)>) -> Vec
             points: points(row, measure),
         });
         Chart {
-            title: format!("{name}, {}", source.name()),
+            title: format!("{name}, {}", source.title()),
             y_label: (*name).to_owned(),
-            // Folds stand out by orders of magnitude.
-            logarithmic: measure == 2 && matches!(source, Source::Shape(_)),
+            // Folds and the first epochs stand out by orders of magnitude.
+            logarithmic: measure >= 2 && matches!(source, Source::Shape(_)),
             ceiling: (measure == 2 && !matches!(source, Source::Shape(_))).then_some(CURVE_CAP),
             curves: curves.filter(|curve| !curve.points.is_empty()).collect(),
             ..Chart::default()

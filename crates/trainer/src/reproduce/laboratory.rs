@@ -119,13 +119,7 @@ impl Laboratory {
                 start: Pairs::default(),
                 count: cell.pairs,
             },
-            Row::HaeFixed => {
-                let matched = domains.boundary.inputs.rows;
-                let places: Vec<usize> = (1..=cell.pairs)
-                    .map(|i| (2 * i * matched + cell.pairs) / (2 * cell.pairs) % matched)
-                    .collect();
-                PairPlan::Fixed(part(&domains.boundary, &places))
-            }
+            Row::HaeFixed => PairPlan::Fixed(domains.boundary.spaced(cell.pairs)),
             // The split is in random order: its first L training samples are the same for every cost.
             _ => {
                 let first = cell.pairs.min(split.train.len());
@@ -151,11 +145,11 @@ impl Laboratory {
         })
     }
 
-    /// Trains and measures a cell. `stop` is asked some times a second.
+    /// Trains and measures a cell.
     ///
     /// # Errors
     /// [`Error`].
-    pub fn run(&self, cell: &Cell, stop: &dyn Fn() -> bool) -> Result<Outcome, Error> {
+    pub fn run(&self, cell: &Cell, watch: &dyn Watch) -> Result<Outcome, Error> {
         let mut prepared = self.prepare(cell)?;
         let fail = |source| failure(cell, source);
         let mut trainer =
@@ -165,7 +159,7 @@ impl Laboratory {
         loop {
             let start = Instant::now();
             let pause = pause_after(cell.trace_every, trainer.epoch());
-            let step = train_until(&mut trainer, &mut prepared, pause, stop);
+            let step = train_until((&mut trainer, cell), &mut prepared, pause, watch);
             seconds += start.elapsed().as_secs_f64();
             let done = match step {
                 Ok(()) => true,
@@ -187,14 +181,31 @@ impl Laboratory {
 /// f and the pairs, both in network units, at the end of a stage.
 pub type Stage = (Network<f32>, Pairs);
 
+/// Looks on while cells are trained.
+pub trait Watch: Sync {
+    /// Whether to stop; asked some times a second.
+    fn stop(&self) -> bool;
+
+    /// Work was done, in the units of [`Cell::work`].
+    fn advance(&self, work: f64) {
+        let _ = work;
+    }
+}
+
+impl<F: Fn() -> bool + Sync> Watch for F {
+    fn stop(&self) -> bool {
+        self()
+    }
+}
+
 impl Laboratory {
     /// f and the pairs at the end of each stage of a cell: L early ones, then the last (Figure 3).
     ///
     /// # Errors
     /// [`Error`].
-    pub fn stages(&self, cell: &Cell, stop: &dyn Fn() -> bool) -> Result<Vec<Stage>, Error> {
+    pub fn stages(&self, cell: &Cell, watch: &dyn Watch) -> Result<Vec<Stage>, Error> {
         let mut prepared = self.prepare(cell)?;
-        let each = cell.schedule.plan().stage_epochs.max(1);
+        let each = cell.plan().stage_epochs.max(1);
         prepared.settings.report_every = each;
         let fail = |source| failure(cell, source);
         let mut trainer =
@@ -202,7 +213,7 @@ impl Laboratory {
         let mut stages = Vec::new();
         for stage in 0..=cell.pairs {
             let pause = (stage < cell.pairs).then_some((stage + 1) * each);
-            match train_until(&mut trainer, &mut prepared, pause, stop) {
+            match train_until((&mut trainer, cell), &mut prepared, pause, watch) {
                 Ok(()) => {}
                 Err(algorithm::Error::Stopped { epoch }) if Some(epoch) == pause => {}
                 Err(error) => return Err(fail(error)),
@@ -230,10 +241,10 @@ fn pause_after(every: usize, epoch: usize) -> Option<usize> {
 
 /// Trains to the end, or to `pause`, which shows as [`algorithm::Error::Stopped`] at that epoch.
 fn train_until(
-    trainer: &mut Trainer,
+    (trainer, cell): (&mut Trainer, &Cell),
     prepared: &mut Prepared,
     pause: Option<usize>,
-    stop: &dyn Fn() -> bool,
+    watch: &dyn Watch,
 ) -> Result<(), algorithm::Error> {
     let mut operator = InUnits {
         operator: prepared.operator.as_mut(),
@@ -241,9 +252,13 @@ fn train_until(
         target: &prepared.units.1,
     };
     let total = trainer.total();
+    let mut before = trainer.epoch();
     let trained = trainer.run(&mut operator, &mut |progress| {
+        let epochs = progress.epoch.saturating_sub(before) as f64;
+        before = progress.epoch;
+        watch.advance(epochs * cell.epoch_work(progress.weights.attraction > 0.0));
         let pauses = Some(progress.epoch) == pause && progress.epoch < total;
-        if pauses || stop() {
+        if pauses || watch.stop() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
@@ -299,6 +314,7 @@ fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
             ..lambda
         },
         schedule: cell.schedule,
+        initialisation: cell.initialisation,
         // Cells run side by side: one thread each.
         threads: 1,
         report_every: if cell.trace_every > 0 {

@@ -8,12 +8,13 @@ pub mod stats;
 mod store;
 mod table;
 
-pub use laboratory::{Laboratory, Outcome, Prepared, Stage, gripper_samples};
+pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch, gripper_samples};
 pub use store::{Kept, Store, run_all};
 pub use table::{Entry, Table, number};
 
-use crate::algorithm::Schedule;
+use crate::algorithm::{Plan, Schedule};
 use crate::cost::Cost;
+use crate::network::Initialisation;
 use crate::shapes::ShapePair;
 
 /// Where the samples come from.
@@ -38,6 +39,18 @@ impl Source {
             Self::Shape(ShapePair::Sp4) => "sp4",
             Self::Generated => "generated",
             Self::Recorded => "recorded",
+        }
+    }
+}
+
+impl Source {
+    /// As drawings say it.
+    #[must_use]
+    pub const fn title(self) -> &'static str {
+        match self {
+            Self::Shape(pair) => pair.name(),
+            Self::Generated => "generated hand motion",
+            Self::Recorded => "recorded hand",
         }
     }
 }
@@ -142,6 +155,8 @@ pub struct Cell {
     pub schedule: Schedule,
     /// Measure also every so many epochs; 0: only at the end.
     pub trace_every: usize,
+    /// How the weights start.
+    pub initialisation: Initialisation,
 }
 
 impl Cell {
@@ -160,7 +175,48 @@ impl Cell {
             seed,
             schedule: Schedule::Paper,
             trace_every: 0,
+            initialisation: Initialisation::Glorot,
         }
+    }
+
+    /// The schedule's numbers for this cell's target.
+    #[must_use]
+    pub fn plan(&self) -> Plan {
+        let dimensions = match self.source {
+            Source::Shape(ShapePair::Sp4) => 3,
+            Source::Shape(_) => 2,
+            Source::Generated | Source::Recorded => 4,
+        };
+        self.schedule.plan_for(dimensions)
+    }
+
+    /// All epochs of all stages.
+    #[must_use]
+    pub fn epochs(&self) -> usize {
+        let plan = self.plan();
+        plan.stage_epochs * self.pairs + plan.last_epochs
+    }
+
+    /// About how much work the cell is, for an estimate: 1 is an epoch on shapes without boundary attraction.
+    #[must_use]
+    pub fn work(&self) -> f64 {
+        let plan = self.plan();
+        let spreads = !matches!(self.row, Row::Pin | Row::CaePin);
+        let spreading = plan.last_epochs.saturating_sub(plan.ramp_start);
+        let spreading = if spreads { spreading } else { 0 };
+        (self.epochs() - spreading) as f64 * self.epoch_work(false)
+            + spreading as f64 * self.epoch_work(true)
+    }
+
+    /// The work of one epoch. The factors are rough measurements on one thread.
+    pub(crate) fn epoch_work(&self, spreads: bool) -> f64 {
+        let hand = if matches!(self.source, Source::Shape(_)) {
+            1.0
+        } else {
+            4.0
+        };
+        let batches = self.plan().batches.max(1) as f64;
+        hand * if spreads { 1.0 + 6.0 / batches } else { 1.0 }
     }
 
     /// A name that differs between any two cells, fit for a file.
@@ -179,8 +235,12 @@ impl Cell {
                 plan.batches
             ),
         };
+        let start = match self.initialisation {
+            Initialisation::Glorot => String::new(),
+            Initialisation::Normal(deviation) => format!("-normal{deviation}"),
+        };
         format!(
-            "{}-{}-l{}-seed{}-{schedule}-every{}",
+            "{}-{}-l{}-seed{}-{schedule}{start}-every{}",
             self.source.name(),
             self.row.slug(),
             self.pairs,

@@ -1,10 +1,11 @@
 //! Cells that are done, kept in a folder: a model file and a JSON file each, the JSON last, so that a cell is there whole or not at
 //! all. A reproduction that was stopped goes on where it was.
 
-use super::{Cell, Error, Laboratory, Outcome};
+use super::{Cell, Error, Laboratory, Outcome, Stage, Watch};
 use crate::data::{Matrix, Pairs};
 use crate::measures::Measures;
 use crate::model::Model;
+use crate::network::Network;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
@@ -41,6 +42,35 @@ struct Record {
     pair_inputs: Vec<Vec<f32>>,
     pair_targets: Vec<Vec<f32>>,
     seconds: f64,
+}
+
+/// The JSON file of a cell's stages.
+#[derive(Serialize, Deserialize)]
+struct StagesRecord {
+    format: u32,
+    cell: String,
+    stages: Vec<StageRecord>,
+}
+
+#[derive(Serialize, Deserialize)]
+struct StageRecord {
+    #[serde(with = "NetworkRecord")]
+    f: Network<f32>,
+    pair_inputs: Vec<Vec<f32>>,
+    pair_targets: Vec<Vec<f32>>,
+}
+
+/// The fields of a network, to be kept.
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Network<f32>")]
+struct NetworkRecord {
+    inputs: usize,
+    hidden: usize,
+    outputs: usize,
+    w1: Vec<f32>,
+    b1: Vec<f32>,
+    w2: Vec<f32>,
+    b2: Vec<f32>,
 }
 
 /// Grows whenever results of the same cell change.
@@ -117,10 +147,7 @@ impl Store {
             pair_targets: to_lists(&outcome.pairs.targets),
             seconds: outcome.seconds,
         };
-        let path = self.path(cell, "json");
-        let text = serde_json::to_vec(&record).map_err(std::io::Error::other);
-        text.and_then(|text| crate::whole_file::write(&path, &text))
-            .map_err(|source| Error::Folder { path, source })?;
+        self.write(&self.path(cell, "json"), &record)?;
         Ok(Kept {
             measures: outcome.measures,
             trace: outcome.trace.clone(),
@@ -137,12 +164,66 @@ impl Store {
         &self,
         laboratory: &Laboratory,
         cell: &Cell,
-        stop: &dyn Fn() -> bool,
+        watch: &dyn Watch,
     ) -> Result<Kept, Error> {
         match self.find(cell) {
             Some(kept) => Ok(kept),
-            None => self.keep(cell, &laboratory.run(cell, stop)?),
+            None => self.keep(cell, &laboratory.run(cell, watch)?),
         }
+    }
+
+    /// The stages of a cell (see [`Laboratory::stages`]) that were kept.
+    #[must_use]
+    pub fn find_stages(&self, cell: &Cell) -> Option<Vec<Stage>> {
+        let text = std::fs::read_to_string(self.path(cell, "stages.json")).ok()?;
+        let record: StagesRecord = serde_json::from_str(&text).ok()?;
+        let is_this = record.format == FORMAT && record.cell == cell.slug();
+        let stages = record.stages.into_iter().map(|stage| {
+            let pairs = Pairs {
+                inputs: from_lists(&stage.pair_inputs),
+                targets: from_lists(&stage.pair_targets),
+            };
+            (stage.f, pairs)
+        });
+        is_this.then(|| stages.collect())
+    }
+
+    /// The stages of a cell: found, or trained now and kept.
+    ///
+    /// # Errors
+    /// [`Error`].
+    pub fn stages(
+        &self,
+        laboratory: &Laboratory,
+        cell: &Cell,
+        watch: &dyn Watch,
+    ) -> Result<Vec<Stage>, Error> {
+        if let Some(stages) = self.find_stages(cell) {
+            return Ok(stages);
+        }
+        let stages = laboratory.stages(cell, watch)?;
+        let record = StagesRecord {
+            format: FORMAT,
+            cell: cell.slug(),
+            stages: (stages.iter())
+                .map(|(f, pairs)| StageRecord {
+                    f: f.clone(),
+                    pair_inputs: to_lists(&pairs.inputs),
+                    pair_targets: to_lists(&pairs.targets),
+                })
+                .collect(),
+        };
+        self.write(&self.path(cell, "stages.json"), &record)?;
+        Ok(stages)
+    }
+
+    fn write(&self, path: &Path, record: &impl Serialize) -> Result<(), Error> {
+        let text = serde_json::to_vec(record).map_err(std::io::Error::other);
+        text.and_then(|text| crate::whole_file::write(path, &text))
+            .map_err(|source| Error::Folder {
+                path: path.to_owned(),
+                source,
+            })
     }
 }
 
@@ -150,13 +231,13 @@ impl Store {
 /// the number of threads. `done` hears of every cell as it is there. The first error stops the rest; what is done is kept.
 ///
 /// # Errors
-/// [`Error`], [`Error::Stopped`] when `stop` said so.
+/// [`Error`], [`Error::Stopped`] when `watch` said so.
 pub fn run_all(
     (laboratory, store): (&Laboratory, &Store),
     cells: &[Cell],
     threads: usize,
     done: &(dyn Fn(&Cell, &Kept) + Sync),
-    stop: &(dyn Fn() -> bool + Sync),
+    watch: &dyn Watch,
 ) -> Result<Vec<Kept>, Error> {
     let next = AtomicUsize::new(0);
     let failed = Mutex::new(None);
@@ -170,7 +251,11 @@ pub fn run_all(
             Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < cells.len())
         {
             let cell = &cells[index];
-            match store.get(laboratory, cell, &|| stop() || has_failed()) {
+            let watch = OrFailed {
+                watch,
+                has_failed: &has_failed,
+            };
+            match store.get(laboratory, cell, &watch) {
                 Ok(kept) => {
                     done(cell, &kept);
                     *results[index]
@@ -199,6 +284,22 @@ pub fn run_all(
         result.ok_or(Error::Stopped)
     });
     kept.collect()
+}
+
+/// Stops also when another thread has failed.
+struct OrFailed<'a> {
+    watch: &'a dyn Watch,
+    has_failed: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Watch for OrFailed<'_> {
+    fn stop(&self) -> bool {
+        self.watch.stop() || (self.has_failed)()
+    }
+
+    fn advance(&self, work: f64) {
+        self.watch.advance(work);
+    }
 }
 
 /// JSON has no NaN: what is not finite is null.

@@ -141,11 +141,15 @@ fn stages_end_with_one_pair_more_each_and_the_last_is_the_trained_map() {
     assert_eq!(pairs, [0, 1, 2]);
     let trained = laboratory.run(&cell, &|| false).unwrap();
     assert_eq!(stages[2].0, trained.model.f);
-    let panels = figure::snapshots(&laboratory, &cell, &|| false).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let store = Store::open(folder.path(), None).unwrap();
+    let panels = figure::snapshots((&laboratory, &store), &cell, &|| false).unwrap();
     assert_eq!(
         (panels.len(), panels[2].points.rows, panels[2].marks.rows),
         (3, 952, 2)
     );
+    // Kept to the last bit: a laboratory that may not work finds them.
+    assert_eq!(store.stages(&laboratory, &cell, &|| true).unwrap(), stages);
     let heat = figure::heat(&laboratory, &cell, &trained.model.f).unwrap();
     assert_eq!(heat.heat.len(), 476);
     assert!(heat.heat.iter().all(|value| (0.0..=1.0).contains(value)));

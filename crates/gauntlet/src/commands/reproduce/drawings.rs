@@ -1,0 +1,261 @@
+//! A hand and a 3-Finger gripper as a few lines, to be told apart at a glance: schematic, not to scale.
+//!
+//! Colours say what moves what: thumb and finger A, index and finger B, ring and little finger and finger C.
+
+use glove::hand::{JOINT_COUNT, Side, segment_orientations};
+use trainer::figures::{Sketch, Stroke};
+
+use crate::record::AXES;
+
+type Point = [f32; 3];
+type Colour = [u8; 3];
+
+const SKIN: Colour = [236, 214, 196];
+const METAL: Colour = [200, 204, 210];
+const THUMB_A: Colour = [40, 90, 170];
+const INDEX_B: Colour = [210, 110, 20];
+const MIDDLE: Colour = [120, 120, 120];
+const RING_C: Colour = [30, 130, 70];
+
+/// Where the view stands: turned about the vertical and raised, radians.
+const TURN: f32 = -0.6;
+const RISE: f32 = 0.30;
+
+/// Millimetres shown: across, and up.
+const ACROSS: (f32, f32) = (-85.0, 115.0);
+const UP: (f32, f32) = (-30.0, 195.0);
+
+/// First joint of each digit in the hand's frame (x to the thumb, y to the back, z to the fingertips), and lengths of its bones, mm.
+const DIGITS: [(Point, [f32; 3], Colour); 5] = [
+    ([20.0, -12.0, 25.0], [44.0, 32.0, 26.0], THUMB_A),
+    ([26.0, 0.0, 92.0], [42.0, 25.0, 20.0], INDEX_B),
+    ([5.0, 3.0, 95.0], [46.0, 29.0, 21.0], MIDDLE),
+    ([-15.0, 1.0, 88.0], [42.0, 27.0, 21.0], RING_C),
+    ([-33.0, -3.0, 79.0], [33.0, 20.0, 19.0], RING_C),
+];
+
+/// The thumb's rest: a flat hand's thumb points aside, and bends across the palm.
+fn thumb_rest() -> glove::hand::Quaternion {
+    let aside = glove::hand::Quaternion::from_euler_angles(0.0, 0.75, 0.0);
+    let across = glove::hand::Quaternion::from_euler_angles(0.0, 0.0, -0.9);
+    aside * across
+}
+
+/// A right hand seen from the palm's side; 25 angles, radians.
+pub(super) fn hand(angles: &[f32]) -> Sketch {
+    let Ok(angles) = <[f32; JOINT_COUNT]>::try_from(angles) else {
+        return Sketch::default();
+    };
+    let orientations = segment_orientations(&angles, Side::Right);
+    let palm: Vec<Point> = vec![
+        [18.0, 0.0, 0.0],
+        [30.0, -4.0, 30.0],
+        DIGITS[1].0,
+        DIGITS[2].0,
+        DIGITS[3].0,
+        DIGITS[4].0,
+        [-28.0, -4.0, 30.0],
+        [-18.0, 0.0, 0.0],
+    ];
+    let mut parts = vec![Part {
+        line: palm,
+        colour: SKIN,
+        width: 0,
+    }];
+    let rest = thumb_rest();
+    for (digit, (base, lengths, colour)) in DIGITS.into_iter().enumerate() {
+        let mut line = vec![base];
+        let mut end = base;
+        for (bone, length) in lengths.into_iter().enumerate() {
+            let segment = 1 + 3 * digit + bone;
+            let turned = if digit == 0 {
+                rest * orientations[segment]
+            } else {
+                orientations[segment]
+            };
+            let along = turned.transform_vector(&[0.0, 0.0, length].into());
+            end = [end[0] + along.x, end[1] + along.y, end[2] + along.z];
+            line.push(end);
+        }
+        parts.push(Part {
+            line,
+            colour,
+            width: 6,
+        });
+    }
+    sketch(parts)
+}
+
+/// The gripper seen with finger A behind; 4 counts.
+pub(super) fn gripper(counts: &[f32]) -> Sketch {
+    let Ok([a, b, c, scissor]) = <[f32; AXES]>::try_from(counts) else {
+        return Sketch::default();
+    };
+    let body: Vec<Point> = vec![
+        [-52.0, -30.0, 30.0],
+        [52.0, -30.0, 30.0],
+        [52.0, 36.0, 30.0],
+        [-52.0, 36.0, 30.0],
+    ];
+    let front: Vec<Point> = vec![
+        [-52.0, -30.0, 30.0],
+        [52.0, -30.0, 30.0],
+        [40.0, -24.0, -20.0],
+        [-40.0, -24.0, -20.0],
+    ];
+    // Counts 0: fingers B and C widest apart, 16° each; 255: their tips meet.
+    let aside = 0.28 * (1.0 - 2.0 * scissor / 255.0);
+    let mut parts = vec![
+        Part {
+            line: front,
+            colour: METAL,
+            width: 0,
+        },
+        Part {
+            line: body,
+            colour: [222, 225, 230],
+            width: 0,
+        },
+    ];
+    parts.push(finger([0.0, 34.0, 30.0], [0.0, -1.0], a, THUMB_A));
+    let towards = |side: f32| [side * libm::sinf(aside), libm::cosf(aside)];
+    parts.push(finger([34.0, -28.0, 30.0], towards(-1.0), b, INDEX_B));
+    parts.push(finger([-34.0, -28.0, 30.0], towards(1.0), c, RING_C));
+    sketch(parts)
+}
+
+/// Three links that bend towards `inwards` (x and y) as the count grows.
+fn finger(base: Point, inwards: [f32; 2], count: f32, colour: Colour) -> Part {
+    const LINKS: [(f32, f32, f32); 3] =
+        [(58.0, -0.35, 1.10), (40.0, 0.15, 0.95), (26.0, 0.10, 0.55)];
+    let closed = (count / 255.0).clamp(-0.1, 1.1);
+    let mut line = vec![base];
+    let mut angle = 0.0;
+    let mut end = base;
+    for (length, open, bend) in LINKS {
+        angle += open + bend * closed;
+        let (aside, up) = (length * libm::sinf(angle), length * libm::cosf(angle));
+        end = [
+            end[0] + inwards[0] * aside,
+            end[1] + inwards[1] * aside,
+            end[2] + up,
+        ];
+        line.push(end);
+    }
+    Part {
+        line,
+        colour,
+        width: 8,
+    }
+}
+
+struct Part {
+    line: Vec<Point>,
+    colour: Colour,
+    width: u32,
+}
+
+/// Filled parts first, then lines from the farthest to the nearest.
+fn sketch(mut parts: Vec<Part>) -> Sketch {
+    let depth = |part: &Part| {
+        let sum: f32 = part.line.iter().map(|&point| seen(point).1).sum();
+        sum / part.line.len().max(1) as f32
+    };
+    parts.sort_by(|a, b| {
+        let filled_first = (a.width > 0).cmp(&(b.width > 0));
+        filled_first.then(depth(b).total_cmp(&depth(a)))
+    });
+    let mut strokes = Vec::new();
+    for part in parts {
+        let points: Vec<(f64, f64)> = part.line.iter().map(|&point| place(point)).collect();
+        if part.width > 0 {
+            // A white rim tells lines that cross apart.
+            strokes.push(Stroke {
+                points: points.clone(),
+                colour: [255, 255, 255],
+                width: part.width + 3,
+            });
+        }
+        strokes.push(Stroke {
+            points,
+            colour: part.colour,
+            width: part.width,
+        });
+    }
+    Sketch {
+        strokes,
+        ..Sketch::default()
+    }
+}
+
+/// Across, away from the viewer, up.
+fn seen([x, y, z]: Point) -> (f32, f32, f32) {
+    let (sin, cos) = libm::sincosf(TURN);
+    let across = x * cos - y * sin;
+    let away = x * sin + y * cos;
+    let (sin, cos) = libm::sincosf(RISE);
+    (across, away * cos + z * sin, z * cos - away * sin)
+}
+
+/// On the drawing, 0 to 1.
+fn place(point: Point) -> (f64, f64) {
+    let (across, _, up) = seen(point);
+    let share = |value: f32, (low, high): (f32, f32)| f64::from((value - low) / (high - low));
+    (share(across, ACROSS), share(up, UP))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn top(sketch: &Sketch, colour: Colour) -> f64 {
+        let strokes = sketch
+            .strokes
+            .iter()
+            .filter(|stroke| stroke.colour == colour);
+        let ends = strokes.filter_map(|stroke| stroke.points.last().copied());
+        ends.map(|end| end.1).fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    #[test]
+    fn a_bent_finger_ends_lower_and_the_others_stay() {
+        let flat = hand(&[0.0; JOINT_COUNT]);
+        let mut angles = [0.0; JOINT_COUNT];
+        for joint in [5, 8, 9] {
+            angles[joint] = 1.3;
+        }
+        let bent = hand(&angles);
+        assert!(top(&bent, INDEX_B) < top(&flat, INDEX_B) - 0.2);
+        assert_eq!(top(&bent, RING_C), top(&flat, RING_C));
+    }
+
+    #[test]
+    fn a_closed_gripper_finger_ends_lower_and_the_others_stay() {
+        let open = gripper(&[0.0, 0.0, 0.0, 130.0]);
+        let closed = gripper(&[255.0, 0.0, 0.0, 130.0]);
+        assert!(top(&closed, THUMB_A) < top(&open, THUMB_A) - 0.1);
+        assert_eq!(top(&closed, RING_C), top(&open, RING_C));
+    }
+
+    #[test]
+    fn every_posture_stays_on_the_drawing() {
+        let within = |sketch: &Sketch| {
+            let points = sketch.strokes.iter().flat_map(|stroke| &stroke.points);
+            points
+                .into_iter()
+                .all(|(x, y)| (0.0..=1.0).contains(x) && (0.0..=1.0).contains(y))
+        };
+        let frames = trainer::motion::Generator::new(&glove::hand::LIMITS, 4).frames(300, 4.0);
+        assert!(frames.iter_rows().all(|row| within(&hand(row))));
+        for count in [0.0, 128.0, 255.0] {
+            for scissor in [0.0, 255.0] {
+                assert!(within(&gripper(&[count, 255.0 - count, count, scissor])));
+            }
+        }
+    }
+
+    #[test]
+    fn what_has_another_shape_is_an_empty_drawing() {
+        assert!(hand(&[0.0; 3]).strokes.is_empty() && gripper(&[]).strokes.is_empty());
+    }
+}

@@ -1,0 +1,243 @@
+//! `gauntlet reproduce`: the paper's tables and figures. Trainings that are done are kept, so that a run that was stopped goes on.
+
+mod drawings;
+mod figures;
+mod tables;
+mod what;
+mod work;
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use glove::hand::LIMITS;
+use serde_json::{Value, json};
+use trainer::algorithm;
+use trainer::network::Initialisation;
+use trainer::optimizer::LearningRate;
+use trainer::reproduce::{Laboratory, Source, Store};
+
+use super::train::Schedule;
+use crate::failure::{OrFail, told};
+use crate::interrupt::Interrupt;
+use crate::out;
+use crate::poses::Motion;
+use crate::stats::seconds;
+use crate::tell::Tell;
+use what::{Frame, What};
+use work::Work;
+
+/// Options of `reproduce`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet reproduce table2
+  gauntlet reproduce table4 --poses my_hand.csv --seeds 5
+  gauntlet reproduce fig3 fig6 --schedule fast
+  gauntlet reproduce all --quick --out look            (a few minutes: what the pictures look like, not their numbers)
+  gauntlet reproduce all                               (all night: every number of the paper)
+
+Everything goes into the folder --out: tables as text and CSV, figures as SVG with their data as CSV, and in
+`trainings` each training with its model. A stopped run goes on where it was when the same command is given again.
+Figures 7 and 8 show a hand's bones and the hardware; there is nothing to compute.")]
+pub struct Reproduce {
+    /// Tables and figures.
+    #[arg(required = true, value_enum)]
+    what: Vec<What>,
+    /// The folder for results.
+    #[arg(long, value_name = "FOLDER", default_value = "reproduction")]
+    out: PathBuf,
+    /// Repetitions, each with its own split, samples and initial weights (1 to 1000) [default: 10, with --quick 1].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..=1000))]
+    seeds: Option<u64>,
+    /// How long each training is.
+    #[arg(long, value_enum, default_value_t = Schedule::Paper, conflicts_with = "quick")]
+    schedule: Schedule,
+    /// Epochs of the last stage, instead of the schedule's (1 to 1000000).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000), conflicts_with = "quick")]
+    epochs: Option<u32>,
+    /// Short trainings, to see the pictures soon; their numbers mean nothing.
+    #[arg(long)]
+    quick: bool,
+    /// Weights that start normally distributed with this deviation (0.1, say) instead of Glorot's uniform ones.
+    #[arg(long, value_name = "DEVIATION", value_parser = deviation)]
+    normal: Option<f64>,
+    /// A recording of a hand for table4 and fig9 to fig13, instead of generated motion.
+    #[arg(long, value_name = "FILE.csv")]
+    poses: Option<PathBuf>,
+    /// Trainings side by side [default: as many as there are processors].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    threads: Option<u16>,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    json: bool,
+}
+
+fn deviation(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value > 0.0 && value <= 10.0 => Ok(value),
+        _ => Err(format!("{text} is not a number above 0, at most 10")),
+    }
+}
+
+/// Trainings of seconds: maps take shape, not more.
+const QUICK: algorithm::Plan = algorithm::Plan {
+    stage_epochs: 30,
+    last_epochs: 250,
+    rate: LearningRate {
+        initial: 2e-3,
+        ..LearningRate::PAPER
+    },
+    ramp_start: 30,
+    ramp_epochs: 60,
+    batches: 4,
+};
+
+impl Reproduce {
+    fn schedule(&self) -> algorithm::Schedule {
+        if self.quick {
+            return algorithm::Schedule::Custom(QUICK);
+        }
+        let schedule = algorithm::Schedule::from(self.schedule);
+        match self.epochs {
+            Some(epochs) => {
+                // Of two dimensions: most of the trainings are on shapes.
+                let plan = schedule.plan_for(2).with_last_epochs(epochs as usize);
+                algorithm::Schedule::Custom(plan)
+            }
+            None => schedule,
+        }
+    }
+
+    fn frame(&self) -> Frame {
+        Frame {
+            seeds: self.seeds.unwrap_or(if self.quick { 1 } else { 10 }),
+            schedule: self.schedule(),
+            initialisation: match self.normal {
+                Some(deviation) => Initialisation::Normal(deviation),
+                None => Initialisation::Glorot,
+            },
+            hand: if self.poses.is_some() {
+                Source::Recorded
+            } else {
+                Source::Generated
+            },
+        }
+    }
+}
+
+/// Where everything is, for the parts that make a table or a figure.
+pub(super) struct Bench<'a> {
+    laboratory: Laboratory,
+    store: Store,
+    frame: Frame,
+    folder: PathBuf,
+    /// The recording, if there is one.
+    motion: Option<Motion>,
+    work: Work<'a>,
+    tell: Tell,
+}
+
+/// Trains what is not there yet and writes the tables and figures.
+///
+/// # Errors
+/// A failure that names the file or the training, or says that the run was stopped and how it goes on.
+pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(options.json);
+    let motion = match &options.poses {
+        Some(path) => Some(Motion::open_for_training(Some(path), 0)?),
+        None => None,
+    };
+    let recording = motion.as_ref().map(Motion::frames);
+    std::fs::create_dir_all(&options.out).or_fail(
+        || format!("the folder {}", options.out.display()),
+        "another name in --out, in a folder where you may write",
+    )?;
+    let frame = options.frame();
+    let wanted = What::each(&options.what);
+    let store = Store::open(options.out.join("trainings"), recording.as_ref()).map_err(told)?;
+    let threads = options.threads.map_or_else(
+        || std::thread::available_parallelism().map_or(1, usize::from),
+        usize::from,
+    );
+    let work = Work::plan(&wanted, &frame, &store, threads, interrupt);
+    tell.say(format_args!("results    in {}", options.out.display()));
+    tell.say(format_args!("trainings  {}", work.describe()));
+    let bench = Bench {
+        laboratory: Laboratory::new(&LIMITS, recording),
+        store,
+        frame,
+        folder: options.out.clone(),
+        motion,
+        work,
+        tell,
+    };
+    let mut results = Vec::new();
+    for what in wanted {
+        results.push(bench.make(what)?);
+    }
+    let took = bench.work.finish();
+    if options.json {
+        return out::json(&json!({
+            "folder": options.out,
+            "seeds": frame.seeds,
+            "took_s": took.as_secs_f64(),
+            "results": results,
+        }));
+    }
+    tell.say(format_args!("done       in {}", seconds(took)));
+    Ok(())
+}
+
+impl Bench<'_> {
+    /// Trains for a table or a figure and writes it.
+    fn make(&self, what: What) -> Result<Value> {
+        let done = self
+            .work
+            .train(&self.laboratory, &self.store, &self.frame.cells(what))?;
+        match what {
+            What::Table2 | What::Table4 => self.table(what, &done),
+            _ => self.figure(what, &done),
+        }
+    }
+
+    /// Says where a result is.
+    fn wrote(&self, what: What, files: &[PathBuf], more: Value) -> Value {
+        let names: Vec<String> = files
+            .iter()
+            .map(|file| file.display().to_string())
+            .collect();
+        self.work.say(
+            &self.tell,
+            &format!("{:<10} {}", what.name(), names.join(", ")),
+        );
+        json!({ "what": what.name(), "files": names, "result": more })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_quick_run_keeps_apart_from_a_real_one() {
+        let frame = |quick| {
+            let options = Reproduce {
+                what: vec![What::Table2],
+                out: PathBuf::new(),
+                seeds: None,
+                schedule: Schedule::Paper,
+                epochs: None,
+                quick,
+                normal: None,
+                poses: None,
+                threads: None,
+                json: false,
+            };
+            options.frame()
+        };
+        let name = |frame: Frame| frame.cells(What::Table2)[0].slug();
+        assert_ne!(name(frame(true)), name(frame(false)));
+        assert_eq!((frame(true).seeds, frame(false).seeds), (1, 10));
+    }
+}

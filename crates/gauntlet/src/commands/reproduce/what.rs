@@ -1,0 +1,265 @@
+//! The tables and figures by name, and the trainings that each of them needs.
+
+use clap::ValueEnum;
+use trainer::algorithm::Schedule;
+use trainer::network::Initialisation;
+use trainer::reproduce::{Cell, Row, Source, Table};
+use trainer::shapes::ShapePair;
+
+/// A table or a figure of the paper. Figures 7 and 8 show a hand's bones and the hardware: nothing to compute.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+#[allow(missing_docs, reason = "the help text says it")]
+pub enum What {
+    /// Everything below.
+    All,
+    /// The seven costs on SP1 to SP4, four pairs, with the t-tests of §3.2.3.
+    Table2,
+    /// The seven costs on a hand, eight pairs.
+    Table4,
+    /// The four pairs of shapes with ten matched points.
+    Fig1,
+    /// The measures over the epochs, SP1.
+    Fig2,
+    /// The map at the end of each session, SP1 to SP4.
+    Fig3,
+    /// Volume occupancy over the number of pairs, SP1.
+    Fig4,
+    /// NMSE over the number of pairs, SP1.
+    Fig5,
+    /// A fold and a twist, coloured by each point's d-Knn.
+    Fig6,
+    /// The pairs that were chosen, as hand and gripper.
+    Fig9,
+    /// The measures over the number of pairs, hand.
+    Fig10,
+    /// The measures over the epochs, hand.
+    Fig11,
+    /// Six seconds of motion, as hand and gripper.
+    Fig12,
+    /// Hand poses and gripper poses along their principal axes.
+    Fig13,
+    /// Distortion over the epochs, SP2 to SP4.
+    Fig14,
+    /// Volume occupancy over the epochs, SP2 to SP4.
+    Fig15,
+    /// d-Knn over the epochs, SP2 to SP4.
+    Fig16,
+    /// NMSE over the epochs, SP2 to SP4.
+    Fig17,
+    /// Volume occupancy over the number of pairs, SP2 to SP4.
+    Fig18,
+    /// NMSE over the number of pairs, SP2 to SP4.
+    Fig19,
+}
+
+impl What {
+    /// For file names.
+    pub fn name(self) -> String {
+        self.to_possible_value()
+            .map_or_else(String::new, |value| value.get_name().to_owned())
+    }
+
+    /// `all` taken apart, doubles left out, in the paper's order.
+    pub fn each(wanted: &[Self]) -> Vec<Self> {
+        let all = wanted.contains(&Self::All);
+        let each = Self::value_variants().iter().copied();
+        each.filter(|what| *what != Self::All && (all || wanted.contains(what)))
+            .collect()
+    }
+}
+
+/// What all trainings of a run have in common.
+#[derive(Debug, Clone, Copy)]
+pub struct Frame {
+    /// Repetitions.
+    pub seeds: u64,
+    /// How long each training is.
+    pub schedule: Schedule,
+    /// How the weights start.
+    pub initialisation: Initialisation,
+    /// Generated motion, or the recording.
+    pub hand: Source,
+}
+
+/// Points of a curve over the epochs.
+const CURVE_POINTS: usize = 42;
+
+impl Frame {
+    /// The trainings that `what` needs before it can be shown.
+    pub fn cells(&self, what: What) -> Vec<Cell> {
+        match what {
+            What::Table2 => self.of_table(&ShapePair::ALL.map(Source::Shape)),
+            What::Fig2 => self.of_table(&[Source::Shape(ShapePair::Sp1)]),
+            What::Fig14 | What::Fig15 | What::Fig16 | What::Fig17 => self.of_table(&APPENDIX),
+            What::Table4 | What::Fig11 => self.of_table(&[self.hand]),
+            What::Fig4 | What::Fig5 => self.over_pairs(&[Source::Shape(ShapePair::Sp1)]),
+            What::Fig18 | What::Fig19 => self.over_pairs(&APPENDIX),
+            What::Fig10 => self.hand_over_pairs(),
+            What::Fig9 | What::Fig12 | What::Fig13 => vec![self.hand_map()],
+            What::Fig6 => self.fold_and_twist().concat(),
+            What::All | What::Fig1 | What::Fig3 => Vec::new(),
+        }
+    }
+
+    /// A cell of Table 2 or 4.
+    pub fn cell(&self, source: Source, row: Row, seed: u64) -> Cell {
+        let cell = Cell {
+            schedule: self.schedule,
+            initialisation: self.initialisation,
+            ..Cell::of_table(source, row, seed)
+        };
+        // Measured on the way, so that one training serves the table and the curves.
+        let every = (cell.epochs() / CURVE_POINTS).max(1);
+        let every = if every > 10 {
+            every - every % 10
+        } else {
+            every
+        };
+        Cell {
+            trace_every: every,
+            ..cell
+        }
+    }
+
+    /// The map that Figures 9, 12 and 13 show.
+    pub fn hand_map(&self) -> Cell {
+        self.cell(self.hand, Row::HaeAdaptive, 1)
+    }
+
+    /// The maps that Figure 3 shows.
+    pub fn snapshots(&self) -> [Cell; 4] {
+        ShapePair::ALL.map(|pair| self.cell(Source::Shape(pair), Row::HaeAdaptive, 1))
+    }
+
+    /// The maps among which Figure 6 looks for a fold, and for a twist.
+    pub fn fold_and_twist(&self) -> [Vec<Cell>; 2] {
+        let seeds = |source: ShapePair, row: Row| {
+            let source = Source::Shape(source);
+            (1..=self.seeds)
+                .map(|seed| self.cell(source, row, seed))
+                .collect()
+        };
+        [
+            seeds(ShapePair::Sp1, Row::DistortionPinBa),
+            seeds(ShapePair::Sp3, Row::HaeZero),
+        ]
+    }
+
+    fn of_table(&self, sources: &[Source]) -> Vec<Cell> {
+        let cells = Table::cells(sources, self.seeds, self.schedule);
+        (cells.iter())
+            .map(|cell| self.cell(cell.source, cell.row, cell.seed))
+            .collect()
+    }
+
+    /// The same training with another number of pairs.
+    fn with_pairs(&self, source: Source, row: Row, seed: u64, pairs: usize) -> Cell {
+        let cell = self.cell(source, row, seed);
+        if cell.pairs == pairs && row != Row::HaeFixed {
+            return cell;
+        }
+        Cell {
+            pairs,
+            trace_every: 0,
+            ..cell
+        }
+    }
+
+    /// L = 1 to 8: HAE with random, adaptive and fixed pairs.
+    fn over_pairs(&self, sources: &[Source]) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for seed in 1..=self.seeds {
+            for &source in sources {
+                for pairs in 1..=8 {
+                    cells.extend(
+                        [Row::HaeOne, Row::HaeAdaptive, Row::HaeFixed]
+                            .map(|row| self.with_pairs(source, row, seed, pairs)),
+                    );
+                }
+            }
+        }
+        cells
+    }
+
+    /// L = 1 to 10, all seven costs.
+    fn hand_over_pairs(&self) -> Vec<Cell> {
+        let mut cells = Vec::new();
+        for seed in 1..=self.seeds {
+            for pairs in 1..=10 {
+                cells.extend(Row::TABLE.map(|row| self.with_pairs(self.hand, row, seed, pairs)));
+            }
+        }
+        cells
+    }
+}
+
+/// The pairs of shapes of Appendix F.
+pub const APPENDIX: [Source; 3] = [
+    Source::Shape(ShapePair::Sp2),
+    Source::Shape(ShapePair::Sp3),
+    Source::Shape(ShapePair::Sp4),
+];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn frame() -> Frame {
+        Frame {
+            seeds: 10,
+            schedule: Schedule::Paper,
+            initialisation: Initialisation::Glorot,
+            hand: Source::Generated,
+        }
+    }
+
+    #[test]
+    fn the_tables_have_the_papers_numbers_of_trainings() {
+        assert_eq!(frame().cells(What::Table2).len(), 4 * 7 * 10);
+        assert_eq!(frame().cells(What::Table4).len(), 7 * 10);
+        assert_eq!(frame().cells(What::Fig4).len(), 8 * 3 * 10);
+        assert_eq!(frame().cells(What::Fig18).len(), 3 * 8 * 3 * 10);
+        assert_eq!(frame().cells(What::Fig10).len(), 10 * 7 * 10);
+    }
+
+    #[test]
+    fn one_training_serves_the_table_and_the_figures() {
+        let table = frame().cells(What::Table2);
+        for figure in [What::Fig2, What::Fig6, What::Fig14, What::Fig17] {
+            assert!(
+                frame()
+                    .cells(figure)
+                    .iter()
+                    .all(|cell| table.contains(cell))
+            );
+        }
+        let shared = frame().cells(What::Fig4);
+        let shared = shared.iter().filter(|cell| table.contains(cell)).count();
+        assert_eq!(shared, 2 * 10);
+        assert!(frame().snapshots().iter().all(|cell| table.contains(cell)));
+        assert!(frame().cells(What::Fig10).contains(&frame().hand_map()));
+    }
+
+    #[test]
+    fn names_differ_between_any_two_trainings() {
+        let cells: Vec<Cell> = (What::each(&[What::All]).iter())
+            .flat_map(|what| frame().cells(*what))
+            .collect();
+        for (i, a) in cells.iter().enumerate() {
+            for b in &cells[i + 1..] {
+                assert_eq!(a == b, a.slug() == b.slug(), "{}", a.slug());
+            }
+        }
+    }
+
+    #[test]
+    fn all_is_everything_once_in_the_papers_order() {
+        let all = What::each(&[What::Fig2, What::All, What::Fig2]);
+        assert_eq!(all.len(), 19);
+        assert_eq!(all[0].name(), "table2");
+        assert_eq!(
+            What::each(&[What::Fig6, What::Fig1]),
+            [What::Fig1, What::Fig6]
+        );
+    }
+}

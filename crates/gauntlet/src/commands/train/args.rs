@@ -1,0 +1,277 @@
+//! The options of `train`, and the words that `--pairs` takes.
+
+use std::path::PathBuf;
+
+use clap::{ArgGroup, Args, ValueEnum};
+use trainer::cost::Cost;
+use trainer::measures::Coverage;
+
+/// Options of `train`.
+#[derive(Debug, Args)]
+#[command(
+    group(ArgGroup::new("data").required(true).args(["poses", "input"])),
+    after_help = "\
+Examples:
+  gauntlet train --poses my_hand.csv --out model.safetensors
+  gauntlet train --poses my_hand.csv --out model.safetensors --schedule fast --seed 7
+  gauntlet train --poses my_hand.csv --out model.safetensors --pairs table3:8
+  gauntlet train --input Q.csv --target X.csv --truth PAIRS.csv --volume 9 --dim 2 --out map.safetensors
+  gauntlet train --input Q.csv --target X.csv --pairs-file PAIRS.csv --cost hae --alpha 0 --out map.safetensors
+  gauntlet train --poses my_hand.csv --out model.safetensors --checkpoint half.checkpoint    (Ctrl-C stops it)
+  gauntlet train --poses my_hand.csv --out model.safetensors --resume half.checkpoint
+
+Hands: CSV with a header, optional `time_s` first, then the 25 joint angles in radians (docs/tool.md lists
+them). A script answers for the person who would show the hand pose that belongs to a gripper pose.
+Any two domains: samples of the input in the columns q0, q1, …, of the target in x0, x1, …, true pairs in
+q0… and x0…; values are taken as they are. 60 % of the rows train, the rest measure the result."
+)]
+pub struct Train {
+    /// The hand poses to train on.
+    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["target", "truth", "normalise", "force", "hidden", "epsilon", "volume", "dim"])]
+    pub poses: Option<PathBuf>,
+    /// Samples of the input domain, columns q0, q1, …
+    #[arg(long, value_name = "Q.csv", requires = "target")]
+    pub input: Option<PathBuf>,
+    /// Samples of the target domain, columns x0, x1, …
+    #[arg(long, value_name = "X.csv", requires = "input")]
+    pub target: Option<PathBuf>,
+    /// Where the trained model goes.
+    #[arg(long, value_name = "MODEL.safetensors")]
+    pub out: PathBuf,
+
+    /// True pairs, columns q0… and x0…: they answer for adaptive and random pairs, and NMSE is measured with them.
+    #[arg(long, value_name = "PAIRS.csv", requires = "input")]
+    pub truth: Option<PathBuf>,
+    /// For the volume occupancy.
+    #[command(flatten)]
+    pub coverage: CoverageArgs,
+    /// Bring every column to mean 0 and standard deviation 1 first; the model keeps the numbers.
+    #[arg(long, requires = "input")]
+    pub normalise: bool,
+    /// Train although a column is constant, rows repeat, or pairs lie outside the samples.
+    #[arg(long, requires = "input")]
+    pub force: bool,
+
+    /// Reference pairs: L or adaptive:L (chosen one after another where they help most), random:L (of the true pairs),
+    /// table3:L (the paper's gripper poses, hands only), boundary:L (of the ring in --pairs-file, at equal distances).
+    /// 8 adaptive ones for hands, 4 for other domains.
+    #[arg(long, value_name = "L|KIND[:L]", value_parser = PairChoice::parse)]
+    pub pairs: Option<PairChoice>,
+    /// Reference pairs, all there from the start; with adaptive ones: those to start with.
+    #[arg(long, value_name = "PAIRS.csv")]
+    pub pairs_file: Option<PathBuf>,
+    /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
+    #[arg(long, conflicts_with_all = ["input", "pairs_file"])]
+    pub no_start_pairs: bool,
+
+    /// What the training minimises (Table 1 of the paper): pin, cae-pin, pin-ba, distortion-pin-ba or hae.
+    #[arg(long, value_name = "COST", default_value = "hae", value_parser = cost)]
+    pub cost: Cost,
+    /// α of Eq. 4 and 6, the weight of distances in the input domain [default: 1 for hae, 0 for the others].
+    #[arg(long, value_name = "A", value_parser = weight)]
+    pub alpha: Option<f64>,
+    /// λ1 of the distortion, λ2 of the pairs, λ3 of the coverage [default: 0.005,1,5; hands 0.005,2,5].
+    #[arg(long, value_name = "L1,L2,L3", value_parser = lambda)]
+    pub lambda: Option<[f64; 3]>,
+    /// How long to train.
+    #[arg(long, value_enum, default_value_t = Schedule::Paper)]
+    pub schedule: Schedule,
+    /// Epochs of the last stage, instead of the schedule's (1 to 1000000).
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
+    pub epochs: Option<u32>,
+    /// First learning rate, instead of the schedule's.
+    #[arg(long, value_name = "R", value_parser = rate)]
+    pub rate: Option<f64>,
+    /// Hidden units (1 to 65535); the bridge runs 300.
+    #[arg(long, value_name = "H", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=65_535))]
+    pub hidden: u32,
+    /// Seed of everything random: the same seed trains the same map.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Share of the rows that measure the result and do not train (0 to 0.9).
+    #[arg(long, value_name = "SHARE", default_value_t = 0.4, value_parser = share)]
+    pub hold_out: f64,
+    /// Threads to compute with; the result is the same [default: 2 where there are so many].
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=64))]
+    pub threads: Option<u16>,
+
+    /// Keep the state of the training here: every minute, and when it is stopped (Ctrl-C, --stop-at).
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+    /// Go on from this checkpoint of the same data and options; the result is that of an unbroken training, bit for bit.
+    #[arg(long, value_name = "FILE")]
+    pub resume: Option<PathBuf>,
+    /// Stop after this epoch and keep the state.
+    #[arg(long, value_name = "EPOCH", requires = "checkpoint", value_parser = clap::value_parser!(u32).range(1..))]
+    pub stop_at: Option<u32>,
+
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// What the volume occupancy of a domain from a file needs.
+#[derive(Debug, Args)]
+pub struct CoverageArgs {
+    /// A target counts as reached when its squared distance to an image is below this (ε of Eq. 15).
+    #[arg(long, value_name = "E", conflicts_with_all = ["volume", "dim"], value_parser = positive)]
+    pub epsilon: Option<f64>,
+    /// Volume (area, length) of the target domain, from which ε follows.
+    #[arg(long, value_name = "V", requires = "dim", value_parser = positive)]
+    pub volume: Option<f64>,
+    /// Dimension of the target domain: 2 for a surface, also for one in space.
+    #[arg(long, value_name = "D", requires = "volume", value_parser = clap::value_parser!(u32).range(1..=64))]
+    pub dim: Option<u32>,
+}
+
+impl CoverageArgs {
+    /// As the measures take it.
+    pub fn coverage(&self) -> Coverage {
+        match (self.epsilon, self.volume, self.dim) {
+            (Some(epsilon), ..) => Coverage::Epsilon(epsilon),
+            (_, Some(volume), Some(dimension)) => Coverage::Volume { volume, dimension },
+            _ => Coverage::Unknown,
+        }
+    }
+}
+
+/// How long to train.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Schedule {
+    /// Seconds to a minute, with a greater learning rate and a quarter of the targets a step.
+    #[value(alias = "short")]
+    Fast,
+    /// The paper's 8,000 + 100 L epochs.
+    Paper,
+}
+
+impl From<Schedule> for trainer::algorithm::Schedule {
+    fn from(word: Schedule) -> Self {
+        match word {
+            Schedule::Fast => Self::Fast,
+            Schedule::Paper => Self::Paper,
+        }
+    }
+}
+
+/// Where reference pairs come from, and how many.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PairChoice {
+    /// Where from.
+    pub kind: PairKind,
+    /// L; none said: as many as usual.
+    pub count: Option<usize>,
+}
+
+/// Where reference pairs come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PairKind {
+    /// Chosen one after another, at the target that is farthest from what is reached.
+    Adaptive,
+    /// Of the true pairs.
+    Random,
+    /// The paper's gripper poses.
+    Table3,
+    /// Of a ring of matched points, at equal distances.
+    Boundary,
+}
+
+impl PairChoice {
+    /// Most pairs that can be asked for.
+    const MOST: usize = 100;
+
+    fn parse(text: &str) -> Result<Self, String> {
+        let (word, number) = match text.split_once(':') {
+            Some((word, number)) => (word, Some(number)),
+            None if text.starts_with(|c: char| c.is_ascii_digit()) => ("adaptive", Some(text)),
+            None => (text, None),
+        };
+        let kind = match word {
+            "adaptive" => PairKind::Adaptive,
+            "random" => PairKind::Random,
+            "table3" => PairKind::Table3,
+            "boundary" => PairKind::Boundary,
+            _ => {
+                return Err(format!(
+                    "{word} is no kind of pairs: adaptive, random, table3 or boundary"
+                ));
+            }
+        };
+        let count = number.map(|number| match number.parse::<usize>() {
+            Ok(count) if (1..=Self::MOST).contains(&count) => Ok(count),
+            _ => Err(format!("{number} is not between 1 and {}", Self::MOST)),
+        });
+        let count = count.transpose()?;
+        if kind == PairKind::Table3 && count.is_some_and(|count| count > 10) {
+            return Err("Table 3 has 10 poses".to_owned());
+        }
+        Ok(Self { kind, count })
+    }
+}
+
+fn cost(text: &str) -> Result<Cost, String> {
+    text.parse()
+        .map_err(|error: trainer::cost::UnknownCost| error.to_string())
+}
+
+fn number(text: &str, allowed: impl Fn(f64) -> bool, what: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if allowed(value) => Ok(value),
+        _ => Err(format!("{text} is not {what}")),
+    }
+}
+
+fn weight(text: &str) -> Result<f64, String> {
+    number(text, |v| (0.0..=1e6).contains(&v), "a number from 0 to 1e6")
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    number(text, |v| v > 0.0 && v.is_finite(), "a number above 0")
+}
+
+fn rate(text: &str) -> Result<f64, String> {
+    number(text, |v| v > 0.0 && v <= 1.0, "a number above 0, at most 1")
+}
+
+fn share(text: &str) -> Result<f64, String> {
+    number(text, |v| (0.0..=0.9).contains(&v), "a share from 0 to 0.9")
+}
+
+fn lambda(text: &str) -> Result<[f64; 3], String> {
+    let values: Result<Vec<f64>, String> =
+        text.split(',').map(|part| weight(part.trim())).collect();
+    let values = values?;
+    <[f64; 3]>::try_from(values)
+        .map_err(|values| format!("{} numbers, three are needed: λ1,λ2,λ3", values.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pairs_are_a_number_or_a_kind_with_a_number() {
+        let choice = |kind, count| Ok(PairChoice { kind, count });
+        assert_eq!(PairChoice::parse("8"), choice(PairKind::Adaptive, Some(8)));
+        assert_eq!(
+            PairChoice::parse("random:5"),
+            choice(PairKind::Random, Some(5))
+        );
+        assert_eq!(PairChoice::parse("table3"), choice(PairKind::Table3, None));
+        for wrong in ["0", "101", "table3:11", "some", "random:", "-1", "8:8"] {
+            assert!(PairChoice::parse(wrong).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn numbers_out_of_range_are_refused() {
+        assert_eq!(lambda("0.005, 1,5"), Ok([0.005, 1.0, 5.0]));
+        for wrong in ["1,2", "1,2,3,4", "1,x,3", "1,2,-3", "1,2,nan"] {
+            assert!(lambda(wrong).is_err(), "{wrong}");
+        }
+        for wrong in ["0", "-1", "nan", "inf"] {
+            assert!(positive(wrong).is_err(), "{wrong}");
+        }
+        assert!(share("1").is_err() && share("0") == Ok(0.0));
+    }
+}
