@@ -185,6 +185,38 @@ fn shape<const Q: usize, const H: usize, const X: usize>(samples: usize) {
     }
 }
 
+/// No hidden unit is active and every product is −0: each lane sum starts at +0, so the outputs are +0 to the bit.
+fn sums_of_nothing() {
+    // SAFETY: as in `shape`.
+    let (Store(bytes), floats) = unsafe { (&mut *(&raw mut IMAGE), &mut *(&raw mut FLOATS)) };
+    let (w1, rest) = floats.split_at_mut(25 * 300);
+    let (minus_one, rest) = rest.split_at_mut(4 * 300);
+    let b2 = &mut rest[..4];
+    w1.fill(0.0);
+    minus_one.fill(-1.0);
+    b2.fill(-0.0);
+    let parameters = Parameters {
+        inputs: 25,
+        hidden: 300,
+        outputs: 4,
+        w1,
+        b1: &minus_one[..300],
+        w2: minus_one,
+        b2,
+    };
+    let meta = Meta {
+        model_id: 1,
+        version: 1,
+        joint_order: JointOrder::natural(25),
+    };
+    encode(&parameters, &meta, bytes).expect("sound parameters");
+    let map = Map::<25, 300, 4>::from_image(bytes).expect("a sound image");
+    for map in [map, map.portable().expect("an image in place")] {
+        let outputs = map.eval(black_box(&[0.5; 25])).expect("in range");
+        assert_eq!(outputs.map(f32::to_bits), [0; 4], "{:?}", map.kernel());
+    }
+}
+
 /// Every input that is not an angle within ±2π is refused by name, all others are taken.
 fn refuses<const Q: usize, const H: usize, const X: usize>(map: &Map<'_, Q, H, X>) {
     let limit = hae::INPUT_LIMIT;
@@ -262,6 +294,7 @@ fn evaluate<const Q: usize, const H: usize, const X: usize>(
 
 #[unsafe(no_mangle)]
 extern "C" fn run() -> ! {
+    sums_of_nothing();
     shape::<25, 300, 4>(20_000);
     shape::<25, 300, 1>(2_000);
     shape::<3, 300, 2>(2_000);
