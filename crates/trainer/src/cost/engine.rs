@@ -108,7 +108,7 @@ impl Engine {
             x_parts: x_parts.collect(),
             q,
             pair: PairPart::default(),
-            unit_parts: UnitPart::all([f.hidden, g.hidden]),
+            unit_parts: UnitPart::all([f, g]),
             ways: batches.iter().map(|_| Default::default()).collect(),
             batches,
             f,

@@ -240,25 +240,28 @@ impl PairPart {
 /// Some units of f or of g, whose gradient is made from the parts' sums.
 pub(super) struct UnitPart {
     pub(super) of_f: bool,
-    pub(super) units: Range<usize>,
-    /// Where each number goes, and the number.
-    pub(super) gradient: Vec<(u32, f32)>,
+    /// Sixteens of units.
+    pub(super) tiles: Range<usize>,
+    /// \[tile\]\[rows of the flat form\]\[16\].
+    pub(super) gradient: Vec<f32>,
 }
 
 impl UnitPart {
     /// All units of both networks, in pieces.
-    pub(super) fn all(hidden: [usize; 2]) -> Vec<Self> {
-        const PIECE: usize = 64;
-        let of = |(hidden, of_f): (usize, bool)| {
-            (0..hidden).step_by(PIECE).map(move |first| Self {
-                of_f,
-                units: first..(first + PIECE).min(hidden),
-                gradient: Vec::new(),
-            })
-        };
-        [(hidden[0], true), (hidden[1], false)]
-            .into_iter()
-            .flat_map(of)
-            .collect()
+    pub(super) fn all(shapes: [Shape; 2]) -> Vec<Self> {
+        const PIECE: usize = 4;
+        let mut parts = Vec::new();
+        for (shape, of_f) in shapes.into_iter().zip([true, false]) {
+            let tiles = shape.padded() / LANES;
+            parts.extend((0..tiles).step_by(PIECE).map(|first| {
+                let tiles = first..(first + PIECE).min(tiles);
+                Self {
+                    of_f,
+                    gradient: vec![0.0; tiles.len() * shape.unit() * LANES],
+                    tiles,
+                }
+            }));
+        }
+        parts
     }
 }

@@ -245,12 +245,33 @@ impl Engine {
             } else {
                 (g, total_g)
             };
-            gradient(machine, net, total, part.units.clone(), &mut part.gradient);
+            let width = net.shape.unit() * LANES;
+            for (tile, rows) in part
+                .tiles
+                .clone()
+                .zip(part.gradient.chunks_exact_mut(width))
+            {
+                gradient(machine, net, total, tile, rows);
+            }
         });
+        let (by_f, by_g) = sum.split_at_mut(f.shape.len());
         for part in &parts {
-            let start = if part.of_f { 0 } else { self.f.len() };
-            for &(at, value) in &part.gradient {
-                sum[start + at as usize] = value;
+            let (shape, by) = if part.of_f {
+                (f.shape, &mut *by_f)
+            } else {
+                (g.shape, &mut *by_g)
+            };
+            let width = shape.unit() * LANES;
+            for (tile, rows) in part.tiles.clone().zip(part.gradient.chunks_exact(width)) {
+                for (r, row) in rows.chunks_exact(LANES).enumerate() {
+                    let start = r * shape.padded() + tile * LANES;
+                    by[start..start + LANES].copy_from_slice(row);
+                }
+            }
+        }
+        for (shape, total, by) in [(f.shape, total_f, by_f), (g.shape, total_g, by_g)] {
+            for k in 0..shape.outputs {
+                by[shape.b2() + k] = total.by_b2(shape, k);
             }
         }
         (self.unit_parts, self.gradient) = (parts, sum);

@@ -2,9 +2,8 @@
 
 use super::super::lanes::{LANES, Lanes};
 use super::super::tree::Tree;
-use super::super::{Machine, dispatch};
+use super::super::{Machine, Shape, dispatch};
 use super::{Cut, Net, Trace, outer_product};
-use core::ops::Range;
 
 /// Samples of a table's row, subsets of them, rows of a leaf's table.
 const GROUP: usize = 4;
@@ -382,65 +381,76 @@ pub(crate) struct Total<'a> {
     pub(crate) distortion: f32,
 }
 
+impl Total<'_> {
+    /// The gradient by output bias `k`, from the sum over all samples.
+    pub(crate) fn by_b2(&self, shape: Shape, k: usize) -> f32 {
+        let of = |parts: &[&[f32]], with: bool| {
+            let at = shape.hidden * shape.sum_row(with) + shape.inputs * shape.outputs + k;
+            parts.iter().fold(0.0, |sum, part| sum + part[at])
+        };
+        of(self.plain, false) + of(self.with_jacobian, true)
+    }
+}
+
 dispatch! {
-    /// The gradient by the weights of units `units` (and by b2, if the first is 0) from the sums: places in the flat form, and numbers.
+    /// The gradient by the weights of 16 units from the sums: \[w1 rows, b1, w2 rows\]\[16\], as the rows of the flat form.
     pub(crate) fn gradient / gradient_kernel(
         net: Net<'_>,
         total: Total<'_>,
-        units: Range<usize>,
-        out: &mut Vec<(u32, f32)>,
+        tile: usize,
+        rows: &mut [f32],
     )
 }
 
 #[inline(always)]
-unsafe fn gradient_kernel<V: Lanes>(
-    net: Net<'_>,
-    total: Total<'_>,
-    units: Range<usize>,
-    out: &mut Vec<(u32, f32)>,
-) {
+unsafe fn gradient_kernel<V: Lanes>(net: Net<'_>, total: Total<'_>, tile: usize, rows: &mut [f32]) {
     let shape = net.shape;
     let (inputs, outputs, map) = (shape.inputs, shape.outputs, shape.map());
+    let (padded, first) = (shape.padded(), tile * LANES);
+    net.check();
+    assert!(first < padded && rows.len() >= shape.unit() * LANES);
+    let with_jacobian = !total.with_jacobian.is_empty();
     let mut plain = vec![0.0_f32; shape.sum_row(false)];
-    let mut whole = vec![0.0_f32; shape.sum_row(true)];
-    // What comes after E in rows without Jacobians is undefined, so E of both kinds is added apart.
-    let gather = |row: usize, plain: &mut [f32], whole: &mut [f32]| {
-        // SAFETY: features by the caller.
-        unsafe {
-            add_rows::<V>(row, total.plain, plain);
-            add_rows::<V>(row, total.with_jacobian, whole);
-        }
-        let both = whole.iter_mut().zip(&*plain).take(map);
-        both.for_each(|(whole, plain)| *whole += plain);
-    };
-    let c = 2.0 * total.distortion;
-    let mut by_w2 = vec![0.0_f32; outputs];
-    out.clear();
-    for j in units.clone() {
-        gather(j, &mut plain, &mut whole);
-        let unit = &net.copies.units[j * shape.unit()..(j + 1) * shape.unit()];
-        let (w1, w2) = unit.split_at(inputs + 1);
-        by_w2.fill(0.0);
-        for (i, w) in w1.iter().enumerate() {
-            let e = &whole[i * outputs..(i + 1) * outputs];
-            let mut by_w1 = dot(e, w2);
-            by_w2.iter_mut().zip(e).for_each(|(s, e)| *s += w * e);
-            if i < inputs && total.distortion != 0.0 {
-                let jacobian = &whole[map + i * outputs..map + (i + 1) * outputs];
-                by_w1 += c * dot(jacobian, w2);
-                let jacobian = by_w2.iter_mut().zip(jacobian);
-                jacobian.for_each(|(s, e)| *s += c * w * e);
+    let mut whole = vec![0.0_f32; shape.sum_row(with_jacobian)];
+    // \[number of a unit's row\]\[16 units\].
+    let mut columns = vec![0.0_f32; whole.len() * LANES];
+    // SAFETY: the lengths were checked; features by the caller.
+    unsafe {
+        for u in 0..LANES.min(shape.hidden - first) {
+            add_rows::<V>(first + u, total.plain, &mut plain);
+            let sums = if with_jacobian {
+                add_rows::<V>(first + u, total.with_jacobian, &mut whole);
+                // What comes after E in rows without Jacobians is undefined, so E of both kinds is added apart.
+                let both = whole.iter_mut().zip(&plain).take(map);
+                both.for_each(|(whole, plain)| *whole += plain);
+                &whole
+            } else {
+                &plain
+            };
+            for (column, &sum) in columns.chunks_exact_mut(LANES).zip(sums) {
+                column[u] = sum;
             }
-            out.push(((i * shape.padded() + j) as u32, by_w1));
         }
-        for (k, &by_w2) in by_w2.iter().enumerate() {
-            out.push(((shape.w2() + k * shape.padded() + j) as u32, by_w2));
+        let weights = net.flat.as_ptr().add(first);
+        let columns = columns.as_ptr();
+        let (by_w1, by_w2) = rows.split_at_mut((inputs + 1) * LANES);
+        by_w2.fill(0.0);
+        let c = V::splat(2.0 * total.distortion);
+        for (i, by_w1) in by_w1.chunks_exact_mut(LANES).enumerate() {
+            let w1 = V::load(weights.add(i * padded));
+            let mut sum = V::splat(0.0);
+            for (k, by_w2) in by_w2.chunks_exact_mut(LANES).take(outputs).enumerate() {
+                let mut e = V::load(columns.add((i * outputs + k) * LANES));
+                if with_jacobian && i < inputs {
+                    let jacobian = columns.add((map + i * outputs + k) * LANES);
+                    e = e.mul_add(c, V::load(jacobian));
+                }
+                sum = sum.mul_add(e, V::load(weights.add(shape.w2() + k * padded)));
+                let by_w2 = by_w2.as_mut_ptr();
+                V::load(by_w2).mul_add(w1, e).store(by_w2);
+            }
+            sum.store(by_w1.as_mut_ptr());
         }
-    }
-    if units.start == 0 {
-        gather(shape.hidden, &mut plain, &mut whole);
-        let by_b2 = whole[inputs * outputs..map].iter().enumerate();
-        out.extend(by_b2.map(|(k, &by_b2)| ((shape.b2() + k) as u32, by_b2)));
     }
 }
 
@@ -460,19 +470,4 @@ unsafe fn add_rows<V: Lanes>(row: usize, parts: &[&[f32]], sum: &mut [f32]) {
             total.store(sum.as_mut_ptr().add(at));
         }
     }
-}
-
-/// Σ a·b in eight sums.
-#[inline(always)]
-fn dot(a: &[f32], b: &[f32]) -> f32 {
-    let mut sums = [0.0_f32; 8];
-    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest = a8.remainder().iter().zip(b8.remainder());
-    let rest = rest.fold(0.0, |sum, (a, b)| sum + a * b);
-    for (a, b) in a8.zip(b8) {
-        for ((sum, a), b) in sums.iter_mut().zip(a).zip(b) {
-            *sum += a * b;
-        }
-    }
-    sums.iter().fold(rest, |sum, s| sum + s)
 }
