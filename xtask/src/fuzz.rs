@@ -70,7 +70,7 @@ fn one(root: &Path, target: &Target, length: Length) -> Result<(), Failure> {
         nightly(&["fuzz", "run", "--fuzz-dir", "fuzz", target.name])
             .arg(&grown)
             .arg(root.join(target.corpus))
-            .args(["--", "-seed=1", "-max_len=1024", "-print_final_stats=1"])
+            .args(["--", "-seed=1", "-max_len=1024", "-len_control=0", "-print_final_stats=1"])
             .arg(format!("-max_total_time={seconds}"))
             .current_dir(root),
     )

@@ -349,3 +349,17 @@ fn no_glove_and_something_that_is_no_glove_are_told_apart() {
         &["bridge: 3 bytes come at 115200 baud, but no I2CStat"],
     );
 }
+
+#[test]
+fn swapped_ports_are_told() {
+    let (_glove, _handle, path) = glove(115_200);
+    let wrong = the_wrong_thing("--gripper", &path);
+    contains(
+        &wrong,
+        &["line: this is the glove's port", "gauntlet ports"],
+    );
+    let (gripper, _handle, path) = gripper(Config::default());
+    let wrong = the_wrong_thing("--glove", &path);
+    contains(&wrong, &["bridge: this is the gripper's port"]);
+    assert_eq!(gripper.writes(), 0);
+}

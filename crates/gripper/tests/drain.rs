@@ -36,6 +36,25 @@ fn after_a_timeout_the_same_look_is_refused_and_another_is_not() {
 }
 
 #[test]
+fn after_a_timeout_the_line_rests_for_one_longest_reply_and_a_silence() {
+    let mut bench = Bench::new();
+    assert!(bench.ask(read(8), &[], CHARACTER).is_err());
+    let told = bench.line.now();
+    settle(&bench.line, &mut bench.link);
+    let rest = timing::quarantine(115_200, 21, timing::silence(115_200));
+    assert_eq!(bench.line.now() - told, rest.as_micros());
+    // After a wrong reply it rests as long as the true one could still have begun.
+    let mut bench = Bench::new();
+    let mut wrong = status(8);
+    wrong[10] ^= 1;
+    let asked = bench.line.now();
+    assert_eq!(bench.ask(read(8), &wrong, CHARACTER), Err(Error::Crc));
+    settle(&bench.line, &mut bench.link);
+    let first = timing::first_byte(115_200, 8, timing::RESPONSE);
+    assert!(bench.line.now() - asked >= first.as_micros());
+}
+
+#[test]
 fn a_late_reply_is_stale_and_never_the_answer() {
     let mut bench = Bench::new();
     assert!(bench.ask(read(8), &[], CHARACTER).is_err());

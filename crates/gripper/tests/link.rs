@@ -134,6 +134,11 @@ fn an_exception_counts_only_with_its_own_crc() {
         bench.ask(read(7), &sealed(&[9, 0x97, 2]), CHARACTER),
         Err(Error::Timeout { received: 5 })
     );
+    // Five sound bytes of the right function are no exception either: only the bit says so.
+    assert_eq!(
+        bench.ask(read(5), &sealed(&[9, 0x03, 2]), CHARACTER),
+        Err(Error::Timeout { received: 5 })
+    );
     assert_eq!(
         bench.ask(read(6), &sealed(&[8, 0x83, 2]), CHARACTER),
         Err(Error::Shape(Field::Unit))

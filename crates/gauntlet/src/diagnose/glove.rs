@@ -8,7 +8,8 @@ use glove::scan::{Config, Health, Scanner, State};
 use glove::{imu, mux};
 
 use super::Findings;
-use super::raw::ask;
+use super::raw::{Heard, ask};
+use super::search::{UNIT, persist};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::platform::Clock;
@@ -70,8 +71,36 @@ pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
             Err(_) => {}
         }
     }
-    nobody(&noise, &mut findings);
+    if gripper_answers(path, interrupt) {
+        findings.wrong(
+            "bridge",
+            "this is the gripper's port: a Modbus status comes, no glove",
+            "the other port for --glove (`gauntlet ports`)",
+        );
+    } else {
+        nobody(&noise, &mut findings);
+    }
     findings
+}
+
+/// Whether a glove's serial bridge answers at `path`, at the speed it is set to or that of its power-on.
+pub(super) fn glove_answers(path: &Path, interrupt: &Interrupt) -> bool {
+    [BAUD, RESET_BAUD].into_iter().any(|baud| {
+        Port::open(path, baud).is_ok_and(|mut port| {
+            // Noise may look like it once.
+            (0..3).all(|_| {
+                let heard = ask(&mut port, &READ_STATUS, 1, WAIT, interrupt);
+                matches!(heard[..], [0xF0..=0xF8])
+            })
+        })
+    })
+}
+
+fn gripper_answers(path: &Path, interrupt: &Interrupt) -> bool {
+    Port::open(path, BAUD).is_ok_and(|mut port| {
+        let heard = persist(&mut port, UNIT, interrupt);
+        matches!(heard, Heard::Answer(..))
+    })
 }
 
 /// I2CStat, or what came instead of it.

@@ -9,6 +9,7 @@ use gripper::registers::two_finger;
 use gripper::{Activation, Fault, Gripper, Status};
 
 use super::Findings;
+use super::glove::glove_answers;
 use super::raw::{Heard, ask_status};
 use super::search::{Found, OTHER_BAUDS, Outcome, TRIES, UNIT, persist, search};
 use crate::failure::Failure;
@@ -113,6 +114,13 @@ fn serial(path: &Path, findings: &mut Findings, interrupt: &Interrupt) {
             "unit",
             format!("unit {UNIT} refuses a status read with exception {code:02X}"),
             "whether this device is a Robotiq gripper",
+        );
+    }
+    if glove_answers(path, interrupt) {
+        return findings.wrong(
+            "line",
+            "this is the glove's port: its serial bridge (SC18IM) answers, no gripper",
+            "the other port for --gripper (`gauntlet ports`)",
         );
     }
     match search(path, &first, interrupt) {
