@@ -55,7 +55,11 @@ fn run(board: Board) {
     } = board;
     let store = WeightsStore::new(slots, bridge::app::expected(AXES));
     let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
-    let gripper = ThreeFinger::new(gripper, gripper::driver::Config::default());
+    let config = gripper::driver::Config {
+        response: board::GRIPPER_RESPONSE,
+        ..gripper::driver::Config::default()
+    };
+    let gripper = ThreeFinger::new(gripper, config);
     let mut app: Bridge = App::new(Machine { time }, scanner, gripper, store, Config::default());
     let mut server = Server::new(host);
     watchdog.start();

@@ -2,12 +2,17 @@
 //! while flashing, bad input. Skipped, with a word, where QEMU or the firmware is missing.
 #![allow(missing_docs)]
 
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
+use bridge::protocol::message::{Answer, Call, Refusal};
 use bridge::{HoldReason, State};
+use gauntlet::failure::Failure;
+use gauntlet::host_link::{Error, HostLink};
+use gauntlet::interrupt::Interrupt;
+use hae::image::JointOrder;
 use loop_tests::chip::firmware;
 use loop_tests::emulated::{Loop, active, alone, bare, cut_power, flash, hold_clutch};
-use loop_tests::images::index_finger;
+use loop_tests::images::{self, SHAPE, index_finger};
 
 /// A machine with much to do can keep the emulator waiting for longer than a sample may be old; the bridge then holds, as
 /// it should, and the stretch says nothing about the loop.
@@ -77,4 +82,113 @@ fn weights_and_an_open_line_alone_do_not_move() {
             .all(|state| !state.is_moving() && *state != State::Holding(HoldReason::NoWeights)),
         "{held:?}"
     );
+}
+
+/// What is wrong with an image, its bytes, and words that the refusal must have.
+fn bad_images() -> Vec<(&'static str, Vec<u8>, &'static str)> {
+    let good = index_finger(9);
+    let mut future = good.clone();
+    future[8] = 2;
+    let mut damaged = good.clone();
+    damaged[5_000] ^= 4;
+    let too_long = vec![0x55; 200_000];
+    vec![
+        (
+            "another joint order",
+            images::random(SHAPE, JointOrder::Columns, 9),
+            "Columns",
+        ),
+        (
+            "another shape",
+            images::random([25, 300, 1], JointOrder::Hand25, 9),
+            "[25, 300, 1]",
+        ),
+        ("a future version", future, "format"),
+        ("a wrong CRC", damaged, "CRC"),
+        ("longer than the slot", too_long, "200000 bytes"),
+        ("no image at all", vec![0x55; 4_096], "not a weights image"),
+    ]
+}
+
+#[test]
+fn bad_images_are_refused_in_words_and_leave_the_bridge_as_it_was() {
+    let Some(firmware) = firmware() else { return };
+    let _alone = alone();
+    let mut emulator = bare(&firmware);
+    let mut link = emulator.link().expect("a bridge");
+    flash(&mut link, &index_finger(5)).expect("weights");
+    let before = link.slots().expect("an answer");
+    for (what, image, word) in bad_images() {
+        let refused = flash(&mut link, &image).expect_err(what);
+        let failure = Failure::from(refused);
+        println!("{what}: {failure}; try {}", failure.next_step());
+        assert!(failure.to_string().contains(word), "{what}: {failure}");
+        assert!(!failure.next_step().is_empty(), "{what}");
+        let after = link.slots().expect("an answer");
+        assert_eq!(
+            (after.active, active(&mut link)),
+            (before.active, Some(5)),
+            "{what}"
+        );
+    }
+}
+
+#[test]
+fn while_engaged_limits_and_weights_stay_as_they_are() {
+    let Some(firmware) = firmware() else { return };
+    let _alone = alone();
+    let mut emulator = bare(&firmware);
+    let mut link = emulator.link().expect("a bridge");
+    flash(&mut link, &index_finger(5)).expect("weights");
+    let configuration = |link: &mut HostLink| match link.call(&Call::ConfigurationGet) {
+        Ok(Answer::Configuration(configuration)) => configuration,
+        other => panic!("{other:?}"),
+    };
+    let before = configuration(&mut link);
+    let mut other = before.clone();
+    other.lead = 20;
+    hold_clutch(&mut link, Duration::from_millis(300));
+    // Each request must come within the heartbeat's 250 ms.
+    link.engage().expect("taken");
+    let refused = link.call(&Call::ConfigurationSet(other.clone()));
+    assert_eq!(refused, Err(Error::Refused(Refusal::Engaged)));
+    link.engage().expect("taken");
+    let refused = flash(&mut link, &index_finger(6)).expect_err("engaged");
+    assert!(
+        refused.to_string().contains("clutch is closed"),
+        "{refused}"
+    );
+    link.release().expect("taken");
+    assert_eq!(configuration(&mut link), before);
+    assert_eq!(active(&mut link), Some(5));
+    // The same is taken with the clutch open.
+    let end = Instant::now() + Duration::from_secs(10);
+    while link.status().expect("an answer").engaged && Instant::now() < end {}
+    assert!(link.call(&Call::ConfigurationSet(other)).is_ok());
+    flash(&mut link, &index_finger(6)).expect("weights");
+}
+
+#[test]
+fn a_host_that_vanishes_in_the_middle_leaves_the_old_weights_and_the_next_goes_on() {
+    let Some(firmware) = firmware() else { return };
+    let _alone = alone();
+    let mut emulator = bare(&firmware);
+    let mut link = emulator.link().expect("a bridge");
+    flash(&mut link, &index_finger(5)).expect("weights");
+    let stop = Interrupt::never().expect("an interrupt");
+    let half = link.flash(&index_finger(6), &stop, &mut |done| {
+        if done > 18_000 {
+            stop.ask();
+        }
+    });
+    assert!(matches!(half, Err(Error::Stopped { .. })), "{half:?}");
+    drop(link);
+    let mut next = emulator.link().expect("the next host");
+    assert_eq!(active(&mut next), Some(5));
+    let never = Interrupt::never().expect("an interrupt");
+    let flashed = next
+        .flash(&index_finger(6), &never, &mut |_| {})
+        .expect("the rest");
+    assert!(flashed.resumed_at > 18_000, "{flashed:?}");
+    assert_eq!(active(&mut next), Some(6));
 }

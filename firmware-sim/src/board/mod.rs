@@ -18,6 +18,10 @@ pub use watchdog::Watchdog;
 /// The processor's and the peripheral bus's clock of the emulated board, in hertz (Arm AN386).
 pub const CLOCK_HZ: u32 = 25_000_000;
 
+/// From the end of a request to the start of the gripper's reply, at most. An emulator's bytes wait for a PC that has other
+/// work; a chip's own UART would take [`bridge::gripper::timing::RESPONSE`].
+pub const GRIPPER_RESPONSE: bridge::Duration = bridge::gripper::timing::RESPONSE_PC;
+
 /// Everything the program owns; made once.
 pub struct Board {
     /// Monotonic time.

@@ -253,3 +253,40 @@ fn a_refusal_is_told_in_one_line_with_its_next_step() {
     );
     assert!(!failure.next_step().is_empty());
 }
+
+#[test]
+fn two_hosts_and_every_other_refusal_have_words_and_a_next_step() {
+    use bridge::store::Error as Store;
+    let refusals = [
+        (Refusal::NoSession, "does not know this session"),
+        (
+            Refusal::Busy { session: 0xAB },
+            "another host has it (session 000000ab)",
+        ),
+        (Refusal::Engaged, "clutch is closed"),
+        (Refusal::Store(Store::Engaged), "clutch is closed"),
+        (Refusal::Store(Store::NotBegun), "no weights image"),
+        (
+            Refusal::Store(Store::Older {
+                found: 1,
+                active: 2,
+            }),
+            "version 1",
+        ),
+        (Refusal::Period { least_ms: 20 }, "20 ms"),
+        (
+            Refusal::Configuration {
+                key: 6,
+                value: 41.0,
+                least: 5.0,
+                greatest: 40.0,
+            },
+            "lead is 41",
+        ),
+    ];
+    for (refusal, word) in refusals {
+        let (what, next) = refusal_words(&refusal);
+        assert!(what.contains(word), "{refusal:?}: {what}");
+        assert!(!next.is_empty(), "{refusal:?}");
+    }
+}
