@@ -37,7 +37,7 @@ pub(crate) fn backward(
     trace.sums.resize((net.shape.hidden + 1) * row, 0.0);
     trace.columns.resize(row * LANES, 0.0);
     trace.rows.resize(row * LANES + LANES, 0.0);
-    trace.table.resize(row * GROUPS * SUBSETS, 0.0);
+    trace.table.resize(CHUNK * LANES * GROUPS * SUBSETS, 0.0);
     trace.totals.resize((tree.levels + 2) * row, 0.0);
     sum(machine, net, tree, flow, trace);
 }
@@ -89,8 +89,8 @@ unsafe fn sum_kernel<V: Lanes>(net: Net<'_>, tree: &Tree, flow: Flow<'_>, trace:
             if node.is_leaf() {
                 let total = totals.as_mut_ptr().add(waiting * row);
                 leaf_rows::<V>(net, flow, node.blocks.start, columns, rows);
-                leaf_table::<V>(row, rows, table, total);
-                look_up::<V>(row, &cuts[first_cut..cuts_end], table, sums);
+                let cuts = &cuts[first_cut..cuts_end];
+                sum_leaf::<V>(row, rows, cuts, table, sums, total);
                 waiting += 1;
             } else {
                 waiting -= 1;
@@ -183,72 +183,88 @@ fn transpose(columns: &[f32], row: usize, rows: &mut [f32]) {
     }
 }
 
-/// The sums of all subsets of each four samples, \[chunk\]\[group\]\[subset\]\[vectors of the chunk\], and of all 16.
+/// Adds to each cut unit's sums those of the samples for which it is active; `total` becomes the sum over all samples. One chunk of
+/// the rows after another, so that its table is still near when it is read.
 #[inline(always)]
-unsafe fn leaf_table<V: Lanes>(row: usize, rows: &[f32], table: &mut [f32], total: *mut f32) {
+unsafe fn sum_leaf<V: Lanes>(
+    row: usize,
+    rows: &[f32],
+    cuts: &[Cut],
+    table: &mut [f32],
+    sums: &mut [f32],
+    total: *mut f32,
+) {
     let vectors = row / LANES;
-    let mut table = table.as_mut_ptr();
-    for first in (0..vectors).step_by(CHUNK) {
-        let chunk = (vectors - first).min(CHUNK);
-        for v in 0..chunk {
-            // SAFETY: the table has GROUPS·SUBSETS rows.
-            unsafe {
-                let mut all = V::splat(0.0);
-                for group in 0..GROUPS {
-                    let at =
-                        |subset: usize| table.add(((group * SUBSETS + subset) * chunk + v) * LANES);
-                    let sample = |s: usize| {
-                        V::load(
-                            rows.as_ptr()
-                                .add((group * GROUP + s) * row + (first + v) * LANES),
-                        )
-                    };
-                    let [a, b, c, d] = [sample(0), sample(1), sample(2), sample(3)];
-                    let (ab, cd) = (a.add(b), c.add(d));
-                    V::splat(0.0).store(at(0));
-                    a.store(at(1));
-                    b.store(at(2));
-                    ab.store(at(3));
-                    c.store(at(4));
-                    a.add(c).store(at(5));
-                    b.add(c).store(at(6));
-                    ab.add(c).store(at(7));
-                    d.store(at(8));
-                    a.add(d).store(at(9));
-                    b.add(d).store(at(10));
-                    ab.add(d).store(at(11));
-                    cd.store(at(12));
-                    a.add(cd).store(at(13));
-                    b.add(cd).store(at(14));
-                    let four = ab.add(cd);
-                    four.store(at(15));
-                    all = all.add(four);
-                }
-                all.store(total.add((first + v) * LANES));
-            }
-        }
-        table = table.wrapping_add(GROUPS * SUBSETS * chunk * LANES);
-    }
-}
-
-/// Adds to each cut unit's sums those of the samples for which it is active.
-#[inline(always)]
-unsafe fn look_up<V: Lanes>(row: usize, cuts: &[Cut], table: &[f32], sums: &mut [f32]) {
-    let vectors = row / LANES;
-    let mut table = table.as_ptr();
     for first in (0..vectors).step_by(CHUNK) {
         let chunk = (vectors - first).min(CHUNK);
         // SAFETY: the caller checked the lengths.
         unsafe {
+            let (total, rows) = (total.add(first * LANES), rows.as_ptr().add(first * LANES));
             let sums = sums.as_mut_ptr().add(first * LANES);
             match chunk {
-                1 => look_up_chunk::<V, 1>(row, cuts, table, sums),
-                2 => look_up_chunk::<V, 2>(row, cuts, table, sums),
-                3 => look_up_chunk::<V, 3>(row, cuts, table, sums),
-                _ => look_up_chunk::<V, CHUNK>(row, cuts, table, sums),
+                1 => sum_chunk::<V, 1>(row, rows, cuts, table, sums, total),
+                2 => sum_chunk::<V, 2>(row, rows, cuts, table, sums, total),
+                3 => sum_chunk::<V, 3>(row, rows, cuts, table, sums, total),
+                _ => sum_chunk::<V, CHUNK>(row, rows, cuts, table, sums, total),
             }
         }
-        table = table.wrapping_add(GROUPS * SUBSETS * chunk * LANES);
+    }
+}
+
+#[inline(always)]
+unsafe fn sum_chunk<V: Lanes, const N: usize>(
+    row: usize,
+    rows: *const f32,
+    cuts: &[Cut],
+    table: &mut [f32],
+    sums: *mut f32,
+    total: *mut f32,
+) {
+    // SAFETY: the caller's promise.
+    unsafe {
+        fill_table::<V, N>(row, rows, table.as_mut_ptr(), total);
+        look_up_chunk::<V, N>(row, cuts, table.as_ptr(), sums);
+    }
+}
+
+/// The sums of all subsets of each four samples, \[group\]\[subset\]\[N vectors\], and of all 16.
+#[inline(always)]
+unsafe fn fill_table<V: Lanes, const N: usize>(
+    row: usize,
+    rows: *const f32,
+    table: *mut f32,
+    total: *mut f32,
+) {
+    for v in 0..N {
+        // SAFETY: the table has GROUPS·SUBSETS rows of N vectors, there are 16 samples.
+        unsafe {
+            let mut all = V::splat(0.0);
+            for group in 0..GROUPS {
+                let at = |subset: usize| table.add(((group * SUBSETS + subset) * N + v) * LANES);
+                let sample = |s: usize| V::load(rows.add((group * GROUP + s) * row + v * LANES));
+                let [a, b, c, d] = [sample(0), sample(1), sample(2), sample(3)];
+                let (ab, cd) = (a.add(b), c.add(d));
+                V::splat(0.0).store(at(0));
+                a.store(at(1));
+                b.store(at(2));
+                ab.store(at(3));
+                c.store(at(4));
+                a.add(c).store(at(5));
+                b.add(c).store(at(6));
+                ab.add(c).store(at(7));
+                d.store(at(8));
+                a.add(d).store(at(9));
+                b.add(d).store(at(10));
+                ab.add(d).store(at(11));
+                cd.store(at(12));
+                a.add(cd).store(at(13));
+                b.add(cd).store(at(14));
+                let four = ab.add(cd);
+                four.store(at(15));
+                all = all.add(four);
+            }
+            all.store(total.add(v * LANES));
+        }
     }
 }
 
