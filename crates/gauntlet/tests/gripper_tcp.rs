@@ -279,6 +279,30 @@ fn frames_that_do_not_answer_are_typed_errors() {
 }
 
 #[test]
+fn a_write_confirmed_for_other_registers_is_a_typed_error() {
+    let (port, questions) = scripted(|id, pdu| {
+        let answer = match pdu[0] {
+            // Ready, open.
+            4 => hex("04 10 31 FF 00 00 06 00 00 06 00 00 06 00 00 89 00 00"),
+            // Three registers, where eight were written.
+            _ => hex("10 03 E8 00 03"),
+        };
+        let mut frame = vec![id[0], id[1], 0, 0, 0, answer.len() as u8 + 1, UNIT];
+        frame.extend_from_slice(&answer);
+        Some(frame)
+    });
+    let mut us = driver(port);
+    let mut failed = false;
+    until(&mut us, Some(motion([100; 4])), |_, heard| {
+        failed |= matches!(heard, Some(Err(_)));
+        failed
+    });
+    let error = us.0.serial_mut().error();
+    assert!(matches!(error, Some(Error::Mismatch(_))), "{error:?}");
+    assert!(questions.try_iter().any(|pdu| pdu[0] == 0x10));
+}
+
+#[test]
 fn silence_ends_within_the_deadline_and_no_block_of_before_leaves_later() {
     let (port, questions) = scripted(|_, _| None);
     let mut us = driver(port);
