@@ -196,6 +196,10 @@ unsafe fn search_boxes<V: Lanes>(
             while near != 0 {
                 let group = row * LANES + near.trailing_zeros() as usize;
                 near &= near - 1;
+                // Boxes that only fill a lane are infinitely far, which is not beyond an infinite or undefined reach.
+                if group * LANES * LANES >= field.count {
+                    continue;
+                }
                 let bound = field.boxes.inner::<V>(query, dims, group);
                 let mut near = !V::bits(bound.gt(V::splat(reach(&best, field))));
                 unseen = unseen.min(infinite.choose(V::mask(near), bound).least());
@@ -205,6 +209,9 @@ unsafe fn search_boxes<V: Lanes>(
                 while near != 0 {
                     let block = group * LANES + near.trailing_zeros() as usize;
                     near &= near - 1;
+                    if block * LANES >= field.count {
+                        continue;
+                    }
                     look_at::<V>(&mut best, query, dims, field, block);
                 }
             }
