@@ -46,6 +46,12 @@ impl Files {
 
     /// `train` in a few epochs, with more words.
     fn train(&self, words: &[&str]) -> std::process::Output {
+        let mut all = vec!["--epochs", "40"];
+        all.extend(words);
+        self.train_long(&all)
+    }
+
+    fn train_long(&self, words: &[&str]) -> std::process::Output {
         let (q, x) = (self.text_of("q.csv"), self.text_of("x.csv"));
         let out = self.text_of("map.safetensors");
         let mut all = vec![
@@ -58,8 +64,6 @@ impl Files {
             &out,
             "--schedule",
             "fast",
-            "--epochs",
-            "40",
         ];
         all.extend(words);
         run(&all)
@@ -596,6 +600,37 @@ fn a_map_that_leaves_the_target_uncovered_is_warned_of() {
         text(&output.stderr)
     );
     assert!(json(&output)["warnings"].to_string().contains("uncovered"));
+}
+
+#[test]
+fn a_map_that_folds_is_warned_of() {
+    let files = Files::new();
+    let mut folded = pairs();
+    for row in 0..folded.targets.rows {
+        let q = folded.inputs.row(row)[0];
+        folded.targets.row_mut(row)[0] = 1.5 * q.abs() + 0.5;
+    }
+    let some: Vec<usize> = (0..144).step_by(7).collect();
+    let folded = Pairs {
+        inputs: folded.inputs.select(&some),
+        targets: folded.targets.select(&some),
+    };
+    files.write_truth("pairs.csv", &folded);
+    let pairs = files.text_of("pairs.csv");
+    let words = [
+        "--pairs-file",
+        &pairs,
+        "--cost",
+        "pin",
+        "--hold-out",
+        "0",
+        "--epochs",
+        "400",
+    ];
+    let output = files.train_long(&words);
+    assert!(output.status.success(), "{}", text(&output.stderr));
+    let said = text(&output.stderr);
+    assert!(said.contains("warning: the map seems to fold"), "{said}");
 }
 
 #[test]

@@ -15,6 +15,7 @@ use trainer::cost::{Cost, Lambda};
 use trainer::data::{Matrix, Pairs, sha256};
 use trainer::measures::Coverage;
 use trainer::model::{Model, Normalisation};
+use trainer::network::{HIDDEN, Initialisation};
 use trainer::operator::Operator;
 
 pub use hand::{Outcome, Request, train};
@@ -100,6 +101,8 @@ pub struct Course {
     pub rate: Option<f64>,
     /// Hidden units.
     pub hidden: usize,
+    /// How the weights start.
+    pub initialisation: Initialisation,
     /// Of everything random.
     pub seed: u64,
     /// Threads.
@@ -124,7 +127,8 @@ impl Course {
             schedule,
             epochs,
             rate: None,
-            hidden: trainer::network::HIDDEN,
+            hidden: HIDDEN,
+            initialisation: Initialisation::Glorot,
             seed,
             threads: None,
             checkpoint: None,
@@ -163,6 +167,7 @@ impl Course {
         };
         settings.schedule = Schedule::Custom(self.plan(task.targets.cols));
         settings.hidden = self.hidden;
+        settings.initialisation = self.initialisation;
         settings.threads = self.threads.unwrap_or(settings.threads);
         settings.report_every = if self.stop_at.is_some() {
             1

@@ -183,3 +183,16 @@ fn a_recording_of_a_real_hand_is_read() {
     let times = poses.time_s.unwrap();
     assert!((times[620] - 20.67).abs() < 0.02, "{}", times[620]);
 }
+
+/// round(i·M/L) of M = 10, L = 4: 2.5, 5, 7.5 and 10, halves up, the ring's last being its first.
+#[test]
+fn spaced_pairs_stand_at_equal_distances_around_their_ring() {
+    let rows: Vec<[f32; 1]> = (0..10).map(|i| [i as f32]).collect();
+    let ring = Pairs {
+        inputs: Matrix::from_rows(&rows),
+        targets: Matrix::from_rows(&rows),
+    };
+    assert_eq!(ring.spaced(4).inputs.data, [3.0, 5.0, 8.0, 0.0]);
+    assert_eq!(ring.spaced(1).targets.data, [0.0]);
+    assert_eq!(Pairs::default().spaced(3).inputs.rows, 0);
+}

@@ -17,8 +17,8 @@ pub struct Panel {
     pub grid: Vec<[usize; 2]>,
     /// A value 0 to 1 a point, drawn as colour from blue to red.
     pub heat: Vec<f64>,
-    /// What the colours mean, from the first to the last; below the drawing.
-    pub heat_label: String,
+    /// Below the drawing; after the colours from first to last when points have values.
+    pub note: String,
     /// Points of a closed line behind the grid.
     pub outline: Matrix,
     /// Dots behind the grid.
@@ -102,7 +102,7 @@ fn draw<'a>(area: &Area<'a>, panel: &Panel) -> Drawn<'a> {
     let mut context = ChartBuilder::on(area)
         .caption(&panel.title, ("sans-serif", 14))
         .margin(6)
-        .margin_bottom(if panel.heat_label.is_empty() { 6 } else { 22 })
+        .margin_bottom(if panel.note.is_empty() { 6 } else { 22 })
         .build_cartesian_2d(x - half..x + half, y - half..y + half)?;
     let grey = BLACK.mix(0.25);
     context.draw_series(cloud.iter().map(|&p| Circle::new(p, 1, grey.filled())))?;
@@ -132,14 +132,23 @@ fn draw<'a>(area: &Area<'a>, panel: &Panel) -> Drawn<'a> {
         let style = ("sans-serif", 16).into_font().color(&red);
         EmptyElement::at(p) + Text::new((i + 1).to_string(), (6, -14), style)
     }))?;
-    if panel.heat_label.is_empty() {
+    if panel.note.is_empty() {
         return Ok(());
     }
-    scale(area, &panel.heat_label)
+    let left = if panel.heat.is_empty() {
+        12
+    } else {
+        scale(area)?
+    };
+    let style = ("sans-serif", 12).into_font().color(&BLACK);
+    let place = (left, SIZE.1 as i32 - 18);
+    area.draw(&Text::new(panel.note.clone(), place, style))
 }
 
-/// The colours from first to last, and what they mean.
-fn scale<'a>(area: &Area<'a>, label: &str) -> Drawn<'a> {
+/// The colours from first to last; where they end.
+fn scale<'a>(
+    area: &Area<'a>,
+) -> Result<i32, DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>> {
     const STEPS: i32 = 40;
     let (left, low) = (12, SIZE.1 as i32 - 16);
     for step in 0..STEPS {
@@ -147,12 +156,7 @@ fn scale<'a>(area: &Area<'a>, label: &str) -> Drawn<'a> {
         let corners = [(left + 2 * step, low), (left + 2 * step + 2, low + 9)];
         area.draw(&Rectangle::new(corners, colour.filled()))?;
     }
-    let style = ("sans-serif", 12).into_font().color(&BLACK);
-    area.draw(&Text::new(
-        label.to_owned(),
-        (left + 2 * STEPS + 8, low - 2),
-        style,
-    ))
+    Ok(left + 2 * STEPS + 8)
 }
 
 /// Neighbours on the grid, as indices of points.

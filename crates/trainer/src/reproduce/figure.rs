@@ -98,7 +98,7 @@ pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Pa
         points: images,
         outline,
         heat: each.iter().map(|d| d.min(HEAT_CAP) / HEAT_CAP).collect(),
-        heat_label: format!("d-Knn, 0 to {HEAT_CAP:.0} and more"),
+        note: format!("d-Knn, 0 to {HEAT_CAP:.0} and more"),
         ..Panel::default()
     })
 }
@@ -194,8 +194,13 @@ pub fn principal(
     motion: &Matrix,
 ) -> Panel {
     let axes = Principal::of(samples, 3);
+    let share: f64 = axes.shares.iter().sum();
     Panel {
         title: title.to_owned(),
+        note: format!(
+            "three axes, {:.0} % of the variance",
+            libm::round(100.0 * share)
+        ),
         points: axes.project(cloud),
         cloud: axes.project(samples),
         marks: axes.project(marks),

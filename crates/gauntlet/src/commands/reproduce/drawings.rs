@@ -18,12 +18,26 @@ const MIDDLE: Colour = [120, 120, 120];
 const RING_C: Colour = [30, 130, 70];
 
 /// Where the view stands: turned about the vertical and raised, radians.
-const TURN: f32 = -0.6;
-const RISE: f32 = 0.30;
+#[derive(Clone, Copy)]
+struct View {
+    turn: f32,
+    rise: f32,
+}
+
+/// A hand from the palm's side, a little from the little finger's.
+const PALM: View = View {
+    turn: -0.55,
+    rise: 0.25,
+};
+/// A gripper from the side of fingers B and C, from above.
+const FRONT: View = View {
+    turn: 0.2,
+    rise: 0.45,
+};
 
 /// Millimetres shown: across, and up.
 const ACROSS: (f32, f32) = (-85.0, 115.0);
-const UP: (f32, f32) = (-30.0, 195.0);
+const UP: (f32, f32) = (-50.0, 190.0);
 
 /// First joint of each digit in the hand's frame (x to the thumb, y to the back, z to the fingertips), and lengths of its bones, mm.
 const DIGITS: [(Point, [f32; 3], Colour); 5] = [
@@ -83,7 +97,7 @@ pub(super) fn hand(angles: &[f32]) -> Sketch {
             width: 6,
         });
     }
-    sketch(parts)
+    sketch(parts, PALM)
 }
 
 /// The gripper seen with finger A behind; 4 counts.
@@ -91,17 +105,18 @@ pub(super) fn gripper(counts: &[f32]) -> Sketch {
     let Ok([a, b, c, scissor]) = <[f32; AXES]>::try_from(counts) else {
         return Sketch::default();
     };
-    let body: Vec<Point> = vec![
-        [-52.0, -30.0, 30.0],
-        [52.0, -30.0, 30.0],
-        [52.0, 36.0, 30.0],
-        [-52.0, 36.0, 30.0],
+    let (wide, deep, low) = (50.0, 38.0, -25.0);
+    let top: Vec<Point> = vec![
+        [-wide, -deep, 30.0],
+        [wide, -deep, 30.0],
+        [wide, deep, 30.0],
+        [-wide, deep, 30.0],
     ];
     let front: Vec<Point> = vec![
-        [-52.0, -30.0, 30.0],
-        [52.0, -30.0, 30.0],
-        [40.0, -24.0, -20.0],
-        [-40.0, -24.0, -20.0],
+        [-wide, -deep, 30.0],
+        [wide, -deep, 30.0],
+        [0.8 * wide, -0.8 * deep, low],
+        [-0.8 * wide, -0.8 * deep, low],
     ];
     // Counts 0: fingers B and C widest apart, 16° each; 255: their tips meet.
     let aside = 0.28 * (1.0 - 2.0 * scissor / 255.0);
@@ -112,8 +127,8 @@ pub(super) fn gripper(counts: &[f32]) -> Sketch {
             width: 0,
         },
         Part {
-            line: body,
-            colour: [222, 225, 230],
+            line: top,
+            colour: [224, 227, 232],
             width: 0,
         },
     ];
@@ -121,7 +136,7 @@ pub(super) fn gripper(counts: &[f32]) -> Sketch {
     let towards = |side: f32| [side * libm::sinf(aside), libm::cosf(aside)];
     parts.push(finger([34.0, -28.0, 30.0], towards(-1.0), b, INDEX_B));
     parts.push(finger([-34.0, -28.0, 30.0], towards(1.0), c, RING_C));
-    sketch(parts)
+    sketch(parts, FRONT)
 }
 
 /// Three links that bend towards `inwards` (x and y) as the count grows.
@@ -156,9 +171,9 @@ struct Part {
 }
 
 /// Filled parts first, then lines from the farthest to the nearest.
-fn sketch(mut parts: Vec<Part>) -> Sketch {
+fn sketch(mut parts: Vec<Part>, view: View) -> Sketch {
     let depth = |part: &Part| {
-        let sum: f32 = part.line.iter().map(|&point| seen(point).1).sum();
+        let sum: f32 = part.line.iter().map(|&point| view.seen(point).1).sum();
         sum / part.line.len().max(1) as f32
     };
     parts.sort_by(|a, b| {
@@ -167,7 +182,7 @@ fn sketch(mut parts: Vec<Part>) -> Sketch {
     });
     let mut strokes = Vec::new();
     for part in parts {
-        let points: Vec<(f64, f64)> = part.line.iter().map(|&point| place(point)).collect();
+        let points: Vec<(f64, f64)> = part.line.iter().map(|&point| view.place(point)).collect();
         if part.width > 0 {
             // A white rim tells lines that cross apart.
             strokes.push(Stroke {
@@ -188,20 +203,22 @@ fn sketch(mut parts: Vec<Part>) -> Sketch {
     }
 }
 
-/// Across, away from the viewer, up.
-fn seen([x, y, z]: Point) -> (f32, f32, f32) {
-    let (sin, cos) = libm::sincosf(TURN);
-    let across = x * cos - y * sin;
-    let away = x * sin + y * cos;
-    let (sin, cos) = libm::sincosf(RISE);
-    (across, away * cos + z * sin, z * cos - away * sin)
-}
+impl View {
+    /// Across, away from the viewer, up.
+    fn seen(self, [x, y, z]: Point) -> (f32, f32, f32) {
+        let (sin, cos) = libm::sincosf(self.turn);
+        let across = x * cos - y * sin;
+        let away = x * sin + y * cos;
+        let (sin, cos) = libm::sincosf(self.rise);
+        (across, away * cos - z * sin, z * cos + away * sin)
+    }
 
-/// On the drawing, 0 to 1.
-fn place(point: Point) -> (f64, f64) {
-    let (across, _, up) = seen(point);
-    let share = |value: f32, (low, high): (f32, f32)| f64::from((value - low) / (high - low));
-    (share(across, ACROSS), share(up, UP))
+    /// On the drawing, 0 to 1.
+    fn place(self, point: Point) -> (f64, f64) {
+        let (across, _, up) = self.seen(point);
+        let share = |value: f32, (low, high): (f32, f32)| f64::from((value - low) / (high - low));
+        (share(across, ACROSS), share(up, UP))
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use anyhow::Result;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES};
 use serde_json::{Value, json};
-use trainer::data::Matrix;
+use trainer::data::{Matrix, write_pairs, write_samples};
 use trainer::figures::{Chart, Panel, Sketch, charts, panels, sketches};
 use trainer::reproduce::figure::{
     fold_share, heat, over_epochs, over_pairs, principal, shapes, snapshots,
@@ -27,6 +27,8 @@ const SP1: [Source; 1] = [Source::Shape(ShapePair::Sp1)];
 const ALL: [usize; 4] = [0, 1, 2, 3];
 const OCCUPANCY: usize = 1;
 const NMSE: usize = 3;
+/// Target samples of a shape (§3.2.1).
+const TARGETS: usize = 8000;
 /// Poses of Figure 12: a quarter of a second apart.
 const SNAPSHOTS: usize = 25;
 const SNAPSHOT_S: f64 = 0.25;
@@ -54,10 +56,7 @@ impl Bench<'_> {
             What::Fig10 => pairs(&[self.frame.hand], &ALL[..3]),
             What::Fig18 => pairs(&APPENDIX, &[OCCUPANCY]),
             What::Fig19 => pairs(&APPENDIX, &[NMSE]),
-            What::Fig1 => {
-                let rows = shapes(&self.laboratory).map_err(told)?;
-                self.panels(what, &rows, Value::Null)
-            }
+            What::Fig1 => self.shapes(what),
             What::Fig3 => self.sessions(what),
             What::Fig6 => self.fold_and_twist(what),
             What::Fig9 => self.chosen_pairs(what, done),
@@ -91,6 +90,41 @@ impl Bench<'_> {
         let path = self.folder.join(format!("{}.svg", what.name()));
         panels(&path, rows).map_err(told)?;
         Ok(self.wrote(what, &[path.clone(), path.with_extension("csv")], more))
+    }
+
+    /// Figure 1, and the samples of the shapes as files that `train` takes.
+    fn shapes(&self, what: What) -> Result<Value> {
+        let rows = shapes(&self.laboratory).map_err(told)?;
+        let path = self.folder.join("fig1.svg");
+        panels(&path, &rows).map_err(told)?;
+        let mut files = vec![path.clone(), path.with_extension("csv")];
+        let mut known = Vec::new();
+        for pair in ShapePair::ALL {
+            let domains = self.laboratory.shape(pair).map_err(told)?;
+            let (q, x) = (&domains.truth.inputs, &domains.truth.targets);
+            let name = pair.name().to_lowercase();
+            let file = |part: &str| self.folder.join(format!("{name}-{part}.csv"));
+            let columns = |prefix: &str, count: usize| -> Vec<String> {
+                (0..count).map(|i| format!("{prefix}{i}")).collect()
+            };
+            let (inputs, targets) = (columns("q", q.cols), columns("x", x.cols));
+            let inputs: Vec<&str> = inputs.iter().map(String::as_str).collect();
+            let targets: Vec<&str> = targets.iter().map(String::as_str).collect();
+            write_samples(file("input"), q, "q").map_err(told)?;
+            let sampled = pair.sample_targets(TARGETS, 1);
+            write_samples(file("target"), &sampled, "x").map_err(told)?;
+            write_pairs(file("truth"), &domains.truth, &inputs, &targets).map_err(told)?;
+            write_pairs(file("ring"), &domains.boundary, &inputs, &targets).map_err(told)?;
+            files.extend(["input", "target", "truth", "ring"].map(file));
+            known.push(json!({
+                "data": name,
+                "nodes": q.rows,
+                "matched": domains.boundary.inputs.rows,
+                "volume": domains.target_volume,
+                "dim": domains.target_dimension,
+            }));
+        }
+        Ok(self.wrote(what, &files, json!(known)))
     }
 
     /// Figure 3.
@@ -137,7 +171,7 @@ impl Bench<'_> {
             panel.title = if size > 0.0 {
                 format!("{word}: {}, {:.0} % flipped", panel.title, 100.0 * flipped)
             } else {
-                format!("no {word} in {seeds} seeds; {}", panel.title)
+                format!("no {word} in seeds 1 to {seeds}; {}", panel.title)
             };
             let text = if size > 0.0 {
                 format!(

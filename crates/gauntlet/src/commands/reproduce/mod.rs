@@ -17,7 +17,7 @@ use trainer::network::Initialisation;
 use trainer::optimizer::LearningRate;
 use trainer::reproduce::{Laboratory, Source, Store};
 
-use super::train::Schedule;
+use super::train::{Schedule, deviation};
 use crate::failure::{OrFail, told};
 use crate::interrupt::Interrupt;
 use crate::out;
@@ -71,13 +71,6 @@ pub struct Reproduce {
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     json: bool,
-}
-
-fn deviation(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(value) if value > 0.0 && value <= 10.0 => Ok(value),
-        _ => Err(format!("{text} is not a number above 0, at most 10")),
-    }
 }
 
 /// Trainings of seconds: maps take shape, not more.

@@ -85,6 +85,9 @@ pub struct Train {
     /// Hidden units (1 to 65535); the bridge runs 300.
     #[arg(long, value_name = "H", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=65_535))]
     pub hidden: u32,
+    /// Weights that start normally distributed with this deviation (0.1, say) instead of Glorot's uniform ones.
+    #[arg(long, value_name = "DEVIATION", value_parser = deviation)]
+    pub normal: Option<f64>,
     /// Seed of everything random: the same seed trains the same map.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
@@ -231,6 +234,15 @@ fn positive(text: &str) -> Result<f64, String> {
 
 fn rate(text: &str) -> Result<f64, String> {
     number(text, |v| v > 0.0 && v <= 1.0, "a number above 0, at most 1")
+}
+
+/// A standard deviation of initial weights.
+pub(in crate::commands) fn deviation(text: &str) -> Result<f64, String> {
+    number(
+        text,
+        |v| v > 0.0 && v <= 10.0,
+        "a number above 0, at most 10",
+    )
 }
 
 fn share(text: &str) -> Result<f64, String> {

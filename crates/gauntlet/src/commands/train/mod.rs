@@ -6,8 +6,10 @@ use std::path::Path;
 
 use anyhow::Result;
 use serde_json::{Value, json};
+use trainer::network::Initialisation;
 use trainer::table3::POSES;
 
+pub(in crate::commands) use args::deviation;
 pub use args::{CoverageArgs, PairChoice, PairKind, Schedule, Train};
 
 use crate::failure::{Failure, told};
@@ -141,6 +143,9 @@ fn course(options: &Train) -> Course {
         epochs: options.epochs.map(|epochs| epochs as usize),
         rate: options.rate,
         hidden: options.hidden as usize,
+        initialisation: options
+            .normal
+            .map_or(Initialisation::Glorot, Initialisation::Normal),
         seed: options.seed,
         threads: options.threads.map(usize::from),
         checkpoint: options

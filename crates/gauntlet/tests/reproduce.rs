@@ -1,0 +1,182 @@
+//! `reproduce` with trainings of two epochs.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod support;
+
+use std::path::Path;
+use std::process::Stdio;
+use std::time::Duration;
+use support::{command, finish, interrupt, json, poses_file, refusal, run, text};
+
+fn reproduce(folder: &Path, words: &[&str]) -> std::process::Output {
+    let out = folder.to_str().unwrap();
+    let mut all = vec!["reproduce", "--out", out, "--epochs", "2", "--seeds", "1"];
+    all.extend(words);
+    run(&all)
+}
+
+#[test]
+fn figures_come_with_their_data_and_a_training_serves_them_all() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = json(&reproduce(
+        folder.path(),
+        &["fig9", "fig1", "fig12", "fig13", "--json"],
+    ));
+    let results = said["results"].as_array().unwrap();
+    let names: Vec<&str> = results
+        .iter()
+        .map(|r| r["what"].as_str().unwrap())
+        .collect();
+    assert_eq!(names, ["fig1", "fig9", "fig12", "fig13"]);
+    for result in results {
+        for file in result["files"].as_array().unwrap() {
+            let content = std::fs::read_to_string(file.as_str().unwrap()).unwrap();
+            let is_whole = content.trim_end().ends_with("</svg>") || content.contains(',');
+            assert!(is_whole, "{file}");
+        }
+    }
+    let shapes = results[0]["result"].as_array().unwrap();
+    let nodes: Vec<u64> = shapes
+        .iter()
+        .map(|s| s["nodes"].as_u64().unwrap())
+        .collect();
+    assert_eq!(nodes, [1409, 952, 1709, 2209]);
+    assert_eq!(results[1]["result"].as_array().unwrap().len(), 8);
+    let trajectory = std::fs::read_to_string(folder.path().join("fig12.csv")).unwrap();
+    assert_eq!(trajectory.lines().count(), 1 + 25);
+    assert!(trajectory.starts_with("pose,time_s,thumb_cmc_flex"));
+    assert!(trajectory.lines().last().unwrap().starts_with("24,6,"));
+    // One training; found again by the next run.
+    let trained = || {
+        let files = std::fs::read_dir(folder.path().join("trainings")).unwrap();
+        let names = files.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        names.filter(|name| name.ends_with(".json")).count()
+    };
+    assert_eq!(trained(), 1);
+    let again = reproduce(folder.path(), &["fig9"]);
+    assert!(
+        text(&again.stdout).contains("0 to do, 1 found"),
+        "{}",
+        text(&again.stdout)
+    );
+    assert_eq!(trained(), 1);
+}
+
+#[test]
+fn the_shapes_files_train_as_any_two_domains() {
+    let folder = tempfile::tempdir().unwrap();
+    assert_eq!(reproduce(folder.path(), &["fig1"]).status.code(), Some(0));
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let (q, x, truth) = (
+        file("sp2-input.csv"),
+        file("sp2-target.csv"),
+        file("sp2-truth.csv"),
+    );
+    let out = file("sp2.safetensors");
+    let said = json(&run(&[
+        "train",
+        "--input",
+        &q,
+        "--target",
+        &x,
+        "--truth",
+        &truth,
+        "--volume",
+        "2.88",
+        "--dim",
+        "2",
+        "--hold-out",
+        "0.5",
+        "--schedule",
+        "fast",
+        "--epochs",
+        "2",
+        "--out",
+        &out,
+        "--json",
+    ]));
+    assert_eq!(said["quality"]["samples"], 476);
+    assert_eq!(said["quality"]["true_pairs"], 476);
+}
+
+#[test]
+fn a_recording_takes_the_place_of_generated_motion() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 120);
+    let output = reproduce(folder.path(), &["fig9", "--poses", poses.to_str().unwrap()]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let mut names = std::fs::read_dir(folder.path().join("trainings")).unwrap();
+    assert!(names.any(|entry| {
+        entry
+            .unwrap()
+            .file_name()
+            .to_str()
+            .unwrap()
+            .starts_with("recorded-")
+    }));
+}
+
+#[test]
+fn a_run_that_is_stopped_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let words = [
+        "reproduce",
+        "fig6",
+        "--out",
+        out,
+        "--epochs",
+        "2",
+        "--seeds",
+        "500",
+        "--threads",
+        "1",
+    ];
+    let child = command(&words)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let kept = || {
+        let files = std::fs::read_dir(folder.path().join("trainings"));
+        files.map_or(0, |files| {
+            let names = files.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+            names.filter(|name| name.ends_with(".json")).count()
+        })
+    };
+    let until = std::time::Instant::now() + Duration::from_secs(120);
+    while kept() < 2 && std::time::Instant::now() < until {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    interrupt(&child);
+    let output = finish(child);
+    assert!(refusal(&output, 1).contains("interrupted"));
+    assert!(kept() >= 2);
+    assert!(!folder.path().join("fig6.svg").exists());
+    // The first seed's trainings are not done again.
+    let output = reproduce(folder.path(), &["fig6"]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stdout).contains("1 to do, 1 found"),
+        "{}",
+        text(&output.stdout)
+    );
+    assert!(folder.path().join("fig6.svg").exists() && folder.path().join("fig6.csv").exists());
+}
+
+#[test]
+fn what_cannot_be_reproduced_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    for words in [&["fig7"][..], &[], &["fig1", "--normal=-1"]] {
+        assert_eq!(
+            reproduce(folder.path(), words).status.code(),
+            Some(2),
+            "{words:?}"
+        );
+    }
+    let file = folder.path().join("file");
+    std::fs::write(&file, "taken").unwrap();
+    let said = refusal(&reproduce(&file, &["fig1"]), 1);
+    assert!(said.contains("file"), "{said}");
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), "taken");
+}
