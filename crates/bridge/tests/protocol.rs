@@ -286,6 +286,23 @@ fn an_image_flashed_over_the_line_is_the_map_and_reads_back_by_its_crc() {
 }
 
 #[test]
+fn both_slots_are_told_each_with_the_crc_of_its_own_image() {
+    let mut host = without_weights().hello();
+    let images = [hand_image(1), hand_image(2)];
+    for image in &images {
+        assert!(host.flash(image).is_ok());
+    }
+    let Ok(Answer::Slots(slots)) = host.ask(Call::Slots) else {
+        panic!()
+    };
+    let crcs = slots.contents.map(|contents| match contents {
+        SlotContents::Image { crc, .. } => crc,
+        other => panic!("{other:?}"),
+    });
+    assert_eq!(crcs, [crc32(&images[0]), crc32(&images[1])]);
+}
+
+#[test]
 fn a_broken_transfer_goes_on_where_it_stopped_for_the_same_image_only() {
     let mut host = without_weights().hello();
     let image = hand_image(1);
