@@ -51,7 +51,7 @@ pub(super) fn all_in_range(q: &[f32]) -> bool {
 /// f(q) on lane-major weights with 19 units in a lane.
 ///
 /// # Safety
-/// `words` holds the lane records and b2.
+/// `words` holds the lane records, of 19 units each, and b2; X is at least 1.
 #[inline]
 pub(super) unsafe fn eval<const Q: usize, const X: usize>(words: &[f32], q: &[f32; Q]) -> [f32; X] {
     let mut sums = MaybeUninit::<[[f32; 8]; X]>::uninit();

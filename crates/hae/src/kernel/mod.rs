@@ -107,7 +107,8 @@ impl<const N: usize> Default for PackedBuffer<N> {
 /// Weights and the kernel that can read them.
 ///
 /// Invariants, which the kernels rely on: `words` starts at a multiple of 64 bytes and holds [`packed_len`] values, in the
-/// kernel's order; this machine supports the kernel, and the kernel supports the shape.
+/// kernel's order; this machine supports the kernel, and the kernel supports the shape, which is that of a checked image:
+/// nothing of it is zero.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Weights<'w, const Q: usize, const H: usize, const X: usize> {
     words: &'w [f32],
