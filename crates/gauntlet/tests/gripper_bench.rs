@@ -297,3 +297,26 @@ fn one_number_moves_the_scissor_in_scissor_mode_and_the_fingers_in_the_others() 
     let led = said["axes"][3]["state"].as_str().unwrap();
     assert!(led.contains("led by the mode"), "{said}");
 }
+
+#[test]
+fn one_number_after_the_scissor_was_moved_on_its_own_waits_until_the_mode_has_it_again() {
+    let (gripper, handle, path) = gripper(Config::default());
+    gripper.preset_active();
+    let home = gripper.positions()[3];
+    let four = ["move", "--to", "60,60,60,30", "--speed", "255", "--json"];
+    json(&bench(&four, &path));
+    assert!((gripper.positions()[3] - 30.0).abs() < 1.0);
+    let said = json(&bench(
+        &["move", "--to", "110", "--speed", "255", "--json"],
+        &path,
+    ));
+    for axis in 0..3 {
+        assert_eq!(said["axes"][axis]["position"], 110, "{said}");
+    }
+    let rest = at_rest(&gripper, &handle);
+    assert!((rest[3] - home).abs() < 1.0, "{rest:?}");
+    assert!(
+        (0..3).all(|axis| (rest[axis] - 110.0).abs() < 1.0),
+        "{rest:?}"
+    );
+}

@@ -214,3 +214,45 @@ fn a_gripper_that_lost_its_power_is_not_activated_by_the_next_motion() {
         assert_eq!(slave.command, [0; 16], "away for {away}: it was written to");
     }
 }
+
+#[test]
+fn a_gripper_that_is_switched_off_while_it_activates_is_not_activated_again_unasked() {
+    let (line, mut gripper) = gripper();
+    let mut slave = Slave::three_finger();
+    slave.status[0] = 0;
+    gripper.activate();
+    let mut requests = 0;
+    let mut ended = None;
+    for _ in 0..60 {
+        let outcome = run_gripper(
+            &line,
+            &mut gripper,
+            line.now() + 2_000_000,
+            &mut |line, end, request| {
+                requests += 1;
+                match requests {
+                    // Activating: gACT set, gIMC 1.
+                    0..=20 => {
+                        slave.serve(line, end, request);
+                        slave.status[0] = if slave.command[0] & 1 == 1 { 0x11 } else { 0 };
+                    }
+                    // Switched off for ten requests; then in reset.
+                    21..=30 => (slave.status, slave.command) = ([0; 16], [0; 16]),
+                    _ => slave.serve(line, end, request),
+                }
+            },
+        );
+        if let Some(Err(error @ Error::Task { .. })) = outcome {
+            ended = Some(error);
+        }
+    }
+    assert!(requests > 40);
+    assert_eq!(
+        ended,
+        Some(Error::Task {
+            task: Task::Activate,
+            why: Failure::NotReady(Activation::Reset)
+        })
+    );
+    assert_eq!(slave.command, [0; 16], "it was written to");
+}

@@ -12,6 +12,8 @@ use crate::interrupt::Interrupt;
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// A broken line is opened again for so long after the last byte that got through.
 const GIVE_UP: Duration = Duration::from_secs(10);
+/// A line that breaks more often in one transfer will not carry it.
+const MOST_BROKEN: u32 = 100;
 /// Pause between two attempts to open it.
 const PAUSE: Duration = Duration::from_millis(250);
 
@@ -41,7 +43,7 @@ struct Transfer<'a> {
     resumed_at: Option<u32>,
     /// Bytes the bridge has.
     there: u32,
-    /// When `there` last grew.
+    /// When a chunk last got through.
     grew: Instant,
     /// The commit was asked for at least once.
     committing: bool,
@@ -52,7 +54,7 @@ impl HostLink {
     /// bridge then reads from its flash. `progress` hears how many bytes are there.
     ///
     /// # Errors
-    /// A line that stays broken for 10 s, a refusal, a CRC that differs, or the person's wish to stop.
+    /// A line that stays broken for 10 s or breaks more than 100 times, a refusal, a CRC that differs, or the person's wish to stop.
     pub fn flash(
         &mut self,
         image: &[u8],
@@ -72,7 +74,11 @@ impl HostLink {
         let slots = loop {
             match outcome {
                 Ok(slots) => break slots,
-                Err(error) if error.is_of_the_line() && transfer.grew.elapsed() < GIVE_UP => {
+                Err(error)
+                    if error.is_of_the_line()
+                        && transfer.grew.elapsed() < GIVE_UP
+                        && broken_lines < MOST_BROKEN =>
+                {
                     broken_lines += 1;
                     if interrupt.sleep(PAUSE) {
                         return Err(transfer.stopped());
@@ -135,7 +141,9 @@ impl Transfer<'_> {
         };
         let begun = received(link.call(&begin)?)?;
         self.resumed_at.get_or_insert(begun);
-        self.grow(begun, progress);
+        // Told, not got through: a bridge that restarts at every chunk must not be begun with for ever.
+        self.there = begun.min(self.total());
+        progress(self.there);
         while self.there < self.total() {
             if interrupt.asked() {
                 return Err(self.stopped());
@@ -173,14 +181,10 @@ impl Transfer<'_> {
                 self.there
             )));
         }
-        self.grow(there, progress);
-        Ok(())
-    }
-
-    fn grow(&mut self, there: u32, progress: &mut dyn FnMut(u32)) {
-        self.there = there.min(self.total());
+        self.there = there;
         self.grew = Instant::now();
         progress(self.there);
+        Ok(())
     }
 }
 

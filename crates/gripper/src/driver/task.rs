@@ -188,9 +188,13 @@ fn activation<const X: usize>(stage: Stage, snapshot: &Snapshot<X>) -> Next {
         (Stage::Write(Action::Clear), _) => Next::Stay(Stage::Write(Action::Set)),
         (Stage::Write(_), _) if !snapshot.activated => Next::Stay(stage),
         (Stage::Watch, _) if is_major(snapshot) => Next::Fail(Failure::Fault(fault)),
+        // It lost its power, perhaps because somebody switched it off in danger: not a second time unasked.
+        (Stage::Watch, _) if !snapshot.activated => {
+            Next::Fail(Failure::NotReady(Activation::Reset))
+        }
         (_, Activation::Ready) if !is_major(snapshot) => Next::Done,
         (Stage::Write(_) | Stage::Watch, _) if snapshot.activated => Next::Stay(Stage::Watch),
-        // A look, or a gripper that lost its activation meanwhile.
+        // A look.
         _ if !snapshot.activated => Next::Stay(Stage::Write(Action::Set)),
         _ if is_major(snapshot) => Next::Stay(Stage::Write(Action::Clear)),
         _ if fault == Fault::Releasing => Next::Stay(Stage::Look),

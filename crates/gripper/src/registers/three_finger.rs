@@ -241,7 +241,8 @@ impl Status {
 
     /// The position each axis follows, as far as the status can tell: it does not say whether B and
     /// C follow A (rICF has no echo). A finger stopped while closing at a count above its own echo,
-    /// or while opening at one below, was not following that echo: then it was finger A's.
+    /// or while opening at one below, was not following that echo: then it was finger A's. So with the
+    /// scissor in scissor mode.
     #[must_use]
     pub fn followed(&self) -> [u8; AXES] {
         let [a, ..] = self.axes.map(|axis| axis.echo);
@@ -252,7 +253,8 @@ impl Status {
                 Contact::ContactOpening => echo <= position,
                 Contact::Moving | Contact::AtPosition => true,
             };
-            if (k == 1 || k == 2) && !explains(echo) && explains(a) {
+            let follows_a = k == 1 || k == 2 || (k == 3 && self.mode == Mode::Scissor);
+            if follows_a && !explains(echo) && explains(a) {
                 a
             } else {
                 echo
@@ -337,6 +339,20 @@ mod tests {
         );
         assert_eq!(status.axes.map(|axis| axis.position), [188, 193, 189, 137]);
         assert_eq!(status.encode(), block);
+    }
+
+    #[test]
+    fn a_scissor_led_by_finger_a_s_request_followed_that_and_not_its_own_echo() {
+        let mut status = Status::decode(&[0; BLOCK]).unwrap();
+        (status.axes[0].echo, status.axes[3].position) = (200, 120);
+        status.contact[3] = Contact::ContactClosing;
+        status.mode = Mode::Scissor;
+        assert_eq!(status.followed(), [200, 0, 0, 200]);
+        // Set on its own, it explains itself; in the other modes it never follows finger A.
+        status.axes[3].echo = 130;
+        assert_eq!(status.followed()[3], 130);
+        (status.axes[3].echo, status.mode) = (0, Mode::Basic);
+        assert_eq!(status.followed()[3], 0);
     }
 
     #[test]

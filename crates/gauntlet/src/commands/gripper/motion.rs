@@ -59,6 +59,12 @@ impl Axes {
         }
     }
 
+    /// Whether the gripper puts its scissor where the mode has it: it does so by itself when a scissor that was moved on
+    /// its own is left to the mode again, and says that it changes its mode meanwhile.
+    fn gives_the_scissor_back<const X: usize>(self, status: &Status<X>) -> bool {
+        self != Self::Each && status.activation == Activation::ChangingMode
+    }
+
     /// A position for each axis as the command block carries it: in scissor mode the scissor's goes where finger A's is.
     fn block<const X: usize>(self, mut position: [u8; X]) -> [u8; X] {
         if self == Self::Scissor
@@ -107,14 +113,29 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
         options.force
     ));
     let mut newest = *status;
+    let written = doing.driver.counters().writes;
     let ended = approach(doing, options, axes, target, &mut newest);
     doing.driver.set_motion(None, doing.waiter.clock.now());
     match ended {
         Some(End::Stands) => Ok(()),
-        Some(End::Refused(failure)) => Err(failure.into()),
+        Some(End::Refused(failure)) => {
+            // The last command may lie ahead of the axes still.
+            if newest.activation == Activation::Ready {
+                hold(doing, &newest, options, axes);
+            }
+            Err(failure.into())
+        }
         Some(End::Silent) => Err(unsure("the gripper stopped answering during the move").into()),
         None => {
             let interrupted = doing.waiter.interrupt.asked();
+            if doing.driver.counters().writes == written {
+                let what = "interrupted before the gripper was told to move";
+                return Err(Failure::new(what, "the same again").into());
+            }
+            if newest.activation == Activation::ChangingMode {
+                let what = "the gripper is still putting its scissor where its mode has it, which no command stops";
+                return Err(unsure(what).into());
+            }
             let why = if interrupted {
                 "interrupted".to_owned()
             } else {
@@ -149,7 +170,9 @@ fn approach<B: Bench<X>, const X: usize>(
     waiter.pump(&mut doing.driver, MOVE_WAIT, |driver, now, heard| {
         if let Some(Ok(status)) = heard {
             (*newest, heard_at) = (status, Instant::now());
-            if let Err(failure) = may_move(&status) {
+            if !axes.gives_the_scissor_back(&status)
+                && let Err(failure) = may_move(&status)
+            {
                 return ControlFlow::Break(End::Refused(failure));
             }
             let stands = |axis: usize| match status.contact[axis] {
@@ -158,7 +181,8 @@ fn approach<B: Bench<X>, const X: usize>(
                 Contact::ContactOpening | Contact::ContactClosing => true,
             };
             let all = (0..X).filter(|axis| axes.moves(*axis)).all(stands);
-            calm = if driver.accepted() && all {
+            let ready = status.activation == Activation::Ready;
+            calm = if driver.accepted() && ready && all {
                 calm + 1
             } else {
                 0
