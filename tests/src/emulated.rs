@@ -9,7 +9,9 @@ use bridge::protocol::message::{Answer, Call, Counters, SlotContents};
 use gauntlet::emulator::{Emulator, Setup};
 use gauntlet::host_link::{Error, HostLink};
 use gauntlet::interrupt::Interrupt;
+use gauntlet::realtime;
 use gripper::Activation;
+use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::pty::{Handle, PtyDevice};
@@ -126,10 +128,7 @@ impl Loop {
         };
         let glove = VirtualGlove::new(Box::new(hand), rig::glove::Config::at_baud(115_200));
         let gripper = VirtualGripper::new(rig::gripper::Config::default());
-        let ports = [
-            PtyDevice::spawn(Box::new(glove), None).expect("a terminal"),
-            PtyDevice::spawn(Box::new(gripper.clone()), None).expect("a terminal"),
-        ];
+        let ports = [spawn(Box::new(glove)), spawn(Box::new(gripper.clone()))];
         let mut emulator = Emulator::new(Setup {
             firmware: firmware.to_owned(),
             glove: Some(ports[0].path().to_owned()),
@@ -184,6 +183,12 @@ impl Loop {
             moved,
         }
     }
+}
+
+/// A device on a terminal of its own, with the priority that the tool gives its own.
+fn spawn(device: Box<dyn Device>) -> Handle {
+    let (handle, _) = realtime::starting(|| PtyDevice::spawn(device, None)).expect("a thread");
+    handle.expect("a terminal")
 }
 
 fn grown(before: &Counters, after: &Counters) -> Counters {

@@ -62,7 +62,8 @@ fn a_power_cut_while_flashing_leaves_a_whole_image() {
     let _alone = alone();
     let cuts = cut_power(&firmware, 20, 0x5EED, &mut |_| {});
     println!("{cuts:?}");
-    assert!(cuts.inside > 5 && cuts.inside < cuts.cuts, "{cuts:?}");
+    // How many come after the end depends on the machine's pace.
+    assert!(cuts.cuts == 20 && cuts.inside > 5, "{cuts:?}");
 }
 
 #[test]

@@ -14,6 +14,7 @@ use tempfile::TempDir;
 
 use crate::failure::{Failure, OrFail};
 use crate::host_link::{Address, HostLink};
+use crate::realtime;
 
 /// The program that emulates.
 pub const QEMU: &str = "qemu-system-arm";
@@ -132,12 +133,14 @@ impl Emulator {
             || "the emulator's folder takes no file".to_owned(),
             "room on the disk",
         )?;
-        let child = Command::new(QEMU)
-            .args(self.arguments())
+        let mut qemu = Command::new(QEMU);
+        qemu.args(self.arguments())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(words)
-            .spawn()
+            .stderr(words);
+        // A chip does not wait for other programs: where the system grants it, neither does the emulator.
+        let child = realtime::starting(|| qemu.spawn())
+            .and_then(|(child, _)| child)
             .or_fail(
                 || format!("{QEMU} does not start"),
                 "`qemu-system-arm --version`, which should print one",

@@ -26,8 +26,11 @@ use line::Line;
 
 /// Times a request is sent before the bridge counts as silent.
 pub const ATTEMPTS: u32 = 5;
-/// For a reply; a chunk takes 46 ms of a line at 115200 baud.
+/// For a reply.
 const REPLY_WAIT: Duration = Duration::from_millis(300);
+/// For the reply to a chunk, which takes 46 ms of a line at 115200 baud. An emulator on a machine with much to do is ten times
+/// slower; chunks that were sent again too early would pile up in front of it.
+const CHUNK_WAIT: Duration = Duration::from_secs(1);
 /// For a reply to what erases or checks flash; an erase block of a real chip takes up to 2 s.
 const FLASH_WAIT: Duration = Duration::from_secs(3);
 /// For a heartbeat: the next one is due then.
@@ -134,6 +137,7 @@ impl HostLink {
             | Call::WeightsCommit
             | Call::SelectSlot { .. }
             | Call::Slots => FLASH_WAIT,
+            Call::WeightsChunk { .. } => CHUNK_WAIT,
             _ => REPLY_WAIT,
         };
         self.ask(call, wait, ATTEMPTS)
