@@ -312,6 +312,69 @@ fn ten_thousand_late_replies_and_none_is_taken_for_fresh() {
 }
 
 #[test]
+fn ten_thousand_late_exceptions_and_none_is_taken_for_a_younger_request_s_answer() {
+    const LATE: u32 = 10_000;
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let line = Line::default();
+    let two_finger = two_finger::Model::TwoFinger85;
+    let mut gripper = TwoFinger::new(line.clone(), two_finger, Config::default());
+    let mut slave = Slave::two_finger();
+    let (mut delayed, mut number, mut busy) = (0, 0_u32, 0);
+    let (mut fresh, mut wrong, mut refused, mut stale) = (0, 0, 0, 0);
+    while delayed < LATE {
+        let motion = Motion {
+            position: [rng.next_u32() as u8],
+            speed: [255],
+            force: [255],
+        };
+        gripper.set_motion((below(&mut rng, 8) != 0).then_some(motion), at(line.now()));
+        let mut own = false;
+        let outcome = run_gripper(
+            &line,
+            &mut gripper,
+            line.now() + 3_000_000,
+            &mut |line, end, request| {
+                number = (number + 1) & 0xFFFF;
+                <TwoFinger<Line> as Numbered<1>>::put(&mut slave.status, number);
+                let mut start = end + 1_750;
+                own = below(&mut rng, 4) == 0;
+                let reply = if own {
+                    // A refusal, and a late one: from just late to the memory's end.
+                    delayed += 1;
+                    start += match below(&mut rng, 3) {
+                        0 => 7_500 + below(&mut rng, 6_000),
+                        1 => 8_500 + below(&mut rng, 30_000),
+                        _ => 8_500 + below(&mut rng, 500_000),
+                    };
+                    let mut reply = vec![9, request[1] | 0x80, 6];
+                    reply.extend(crc16(&reply).to_le_bytes());
+                    reply
+                } else {
+                    slave.answer(request)
+                };
+                // It answers in order.
+                start = start.max(busy);
+                busy = start + reply.len() as u64 * CHARACTER;
+                line.send(start, CHARACTER, &reply);
+            },
+        );
+        match outcome.expect("every wait ends") {
+            Ok(status) if <TwoFinger<Line> as Numbered<1>>::number(&status) == number => fresh += 1,
+            Ok(_) => wrong += 1,
+            Err(Error::Link(link::Error::Exception(_))) if own => refused += 1,
+            Err(Error::Link(link::Error::Exception(_))) => wrong += 1,
+            Err(Error::Link(link::Error::Stale)) => stale += 1,
+            Err(_) => {}
+        }
+    }
+    println!(
+        "{LATE} late exceptions: {wrong} taken for a younger request's answer; {fresh} fresh statuses taken, {stale} told as stale, {refused} just in time"
+    );
+    assert_eq!(wrong, 0);
+    assert!(fresh > 2_000 && stale > 0, "the link still works");
+}
+
+#[test]
 fn after_any_noise_the_next_request_at_the_latest_succeeds() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let (mut cases, mut lost, mut believed) = (0, 0, 0);

@@ -82,6 +82,45 @@ fn a_late_reply_is_stale_and_never_the_answer() {
     );
 }
 
+/// Exception 02 of slave 9 to a request of this function.
+fn refusal(function: u8) -> Vec<u8> {
+    sealed(&[9, function | 0x80, 2])
+}
+
+#[test]
+fn a_late_exception_is_stale_and_never_the_answer_to_the_next_request() {
+    for (before, now_asked, answer) in [
+        // Of the same function: the exception alone cannot tell the two apart.
+        (read(8), read(7), status(7)),
+        (exchange(8), read(8), status(8)),
+        (read(8), exchange(8), exchanged()),
+    ] {
+        let late = refusal(before.function());
+        let mut bench = Bench::new();
+        assert!(bench.ask(before, &[], CHARACTER).is_err());
+        // It comes while the next request waits, ahead of that one's own reply.
+        let both = [&late[..], &answer[..]].concat();
+        assert_eq!(bench.ask(now_asked, &both, CHARACTER), Err(Error::Stale));
+        settle(&bench.line, &mut bench.link);
+        let counters = bench.link.counters();
+        // The exception, and the reply behind it: nobody can say any more what it answers.
+        assert_eq!((counters.stale, counters.exceptions), (2, 0));
+        // In the quarantine it is recognised too, and pays its debt.
+        let mut bench = Bench::new();
+        assert!(bench.ask(before, &[], CHARACTER).is_err());
+        bench.line.send(bench.line.now() + 300, CHARACTER, &late);
+        settle(&bench.line, &mut bench.link);
+        let counters = bench.link.counters();
+        assert_eq!((counters.stale, counters.noise), (1, 0));
+        assert_eq!(bench.link.debt(&before, at(bench.line.now())), Debt::None);
+        assert_eq!(bench.ask(now_asked, &answer, CHARACTER), Ok(answer));
+        // With nothing owed the same bytes are the answer.
+        let refused = refusal(now_asked.function());
+        let outcome = bench.ask(now_asked, &refused, CHARACTER);
+        assert!(matches!(outcome, Err(Error::Exception(_))), "{outcome:?}");
+    }
+}
+
 #[test]
 fn bytes_on_an_idle_line_are_drained_before_anything_is_sent() {
     let mut bench = Bench::new();

@@ -97,6 +97,10 @@ impl<S> Link<S> {
             return Verdict::More;
         }
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
+        if let Some(owed) = self.owed.late_exception(bytes) {
+            self.owed.pay(owed);
+            return Verdict::Wrong(Error::Stale);
+        }
         if let Some(verdict) = exception(bytes, pending) {
             return verdict;
         }

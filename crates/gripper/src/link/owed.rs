@@ -6,7 +6,8 @@
 //! goes (a slave answers in order): such a debt is [`Debt::Settled`], and still avoided where that
 //! costs nothing.
 
-use crate::{Instant, rtu::Request, timing};
+use crate::rtu::{EXCEPTION_FRAME, Frame, Request, function};
+use crate::{Instant, timing};
 use heapless::Vec;
 
 /// How a reply starts and how long it is: all that tells one from another.
@@ -111,6 +112,19 @@ impl Owed {
         known
             .into_iter()
             .find(|owed| owed.head == *head && expected.is_none_or(|fresh| fresh.head != *head))
+    }
+
+    /// The request that a late exception at the front of `bytes` refuses: the oldest unanswered one of
+    /// its function. An exception does not say which request it answers; a slave answers in order, so
+    /// while one of that function is owed it is not the answer to a younger one.
+    pub(super) fn late_exception(&self, bytes: &[u8]) -> Option<Signature> {
+        let frame = Frame::new_checked(bytes.get(..EXCEPTION_FRAME)?).ok()?;
+        let refuses = |entry: &&Entry| {
+            let [unit, code, _] = entry.signature.head;
+            unit == frame.unit() && code | function::EXCEPTION == frame.function()
+        };
+        let oldest = self.0.iter().filter(refuses).min_by_key(|entry| entry.sent);
+        oldest.map(|entry| entry.signature)
     }
 
     /// The owed reply of this look has come: late, but in order, so that what was asked before it is

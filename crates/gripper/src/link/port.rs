@@ -1,7 +1,7 @@
 //! The link's dealings with the port: never more than what is ready, never a wait.
 
 use super::{Error, Event, Link, POLL_BYTES, PortFault, Refused, State};
-use crate::rtu::function;
+use crate::rtu::{EXCEPTION_FRAME, function};
 use crate::{Instant, timing};
 use embedded_io::{Error as _, Read, ReadReady, Write};
 
@@ -137,13 +137,18 @@ impl<S: Read + ReadReady + Write> Link<S> {
         Ok((count as u32, self.recognise_late(now) as u32))
     }
 
-    /// Pays the debt whose reply lies at the front of the drained bytes; returns its length, or 0.
+    /// Pays the debt whose reply, or refusal, lies at the front of the drained bytes; returns its
+    /// length, or 0.
     fn recognise_late(&mut self, now: Instant) -> usize {
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
-        let Some(owed) = self.owed.matching(bytes, None) else {
-            return 0;
+        let (owed, length) = match self.owed.late_exception(bytes) {
+            Some(owed) => (owed, EXCEPTION_FRAME),
+            None => match self.owed.matching(bytes, None) {
+                Some(owed) => (owed, owed.length),
+                None => return 0,
+            },
         };
-        let Some(frame) = bytes.get(..owed.length) else {
+        let Some(frame) = bytes.get(..length) else {
             return 0;
         };
         if crate::rtu::Frame::new_checked(frame).is_err() {
@@ -152,8 +157,8 @@ impl<S: Read + ReadReady + Write> Link<S> {
         self.trace.note(now, Event::Late, frame);
         self.counters.count(Error::Stale);
         self.owed.pay(owed);
-        self.drop_front(owed.length);
-        owed.length
+        self.drop_front(length);
+        length
     }
 
     /// Counts and traces `count` bytes at the end of what was received.
