@@ -222,8 +222,7 @@ fn a_lost_reply_costs_one_cycle() {
 fn activation_writes_only_when_asked_and_waits_for_the_gripper() {
     let (line, mut gripper) = gripper();
     let mut slave = Slave::three_finger();
-    slave.status = [0; 16];
-    slave.status[2] = 7;
+    slave.status[..3].copy_from_slice(&[0, 0, 7]);
     let cycle = |gripper: &mut ThreeFinger<Line>, slave: &mut Slave| {
         run_gripper(
             &line,

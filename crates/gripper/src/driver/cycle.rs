@@ -4,7 +4,7 @@ use super::family::{Block, Family, may_move};
 use super::task::Stage;
 use super::{Driver, Error};
 use crate::link::{self, Debt, Field, Refused};
-use crate::registers::{COMMAND, STATUS};
+use crate::registers::{COMMAND, Kind, STATUS};
 use crate::rtu::{Registers, Request, Response, function};
 use crate::{Instant, Motion, Status, timing};
 use embedded_io::{Read, ReadReady, Write};
@@ -57,7 +57,15 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         let mut block = self
             .snapshot
             .map_or(Block::default(), |snapshot| snapshot.raw);
+        let wide = self
+            .doing
+            .is_some_and(|doing| doing.quantity > F::REGISTERS);
+        let mut kind = Ok(());
         let answer = match self.link.poll(now)? {
+            Ok(Response::ReadHolding(values)) if wide => {
+                kind = self.identity.wide_answer(values.bytes());
+                Ok(())
+            }
             Ok(
                 Response::ReadHolding(values)
                 | Response::ReadInput(values)
@@ -76,19 +84,64 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         };
         let doing = self.doing.take();
         if let Err(error) = answer {
-            self.note_failure(error);
-            return Some(Err(error.into()));
+            return self.fail(error, doing, wide).map(Err);
         }
         self.misses = 0;
         let doing = doing?;
-        if doing.quantity < F::WHOLE {
+        if !wide && doing.quantity < F::WHOLE {
             // A sign of life, not a status.
+            let stale = self.link.counters().stale;
+            kind = self.identity.short_answer(doing.quantity, stale);
+        }
+        if let Err(kind) = kind {
+            return self.refuse(kind).map(Err);
+        }
+        if wide || doing.quantity < F::WHOLE {
             return None;
         }
-        Some(self.understand(&block, &doing, now))
+        let understood = self.understand(&block, &doing, now);
+        if understood.is_ok() {
+            self.identity.whole_answer();
+            self.identity.near_answer(doing.function);
+        }
+        Some(understood)
+    }
+
+    /// A gripper of another family answers.
+    fn refuse(&mut self, kind: Kind) -> Option<Error> {
+        if !self.config.check_family {
+            return None;
+        }
+        self.verify = true;
+        Some(Error::OtherGripper(kind))
+    }
+
+    /// What to make of a failure. That a read of more registers than the family has goes unanswered,
+    /// or is refused, is as it should be.
+    fn fail(&mut self, error: link::Error, doing: Option<Doing<X>>, wide: bool) -> Option<Error> {
+        self.note_failure(error);
+        match error {
+            link::Error::Timeout { received: 0 } if wide => {
+                self.identity.wide_silence();
+                return None;
+            }
+            link::Error::Exception(code) if wide && self.identity.wide_refusal(code) => {
+                return None;
+            }
+            link::Error::Timeout { received: 0 }
+                if doing.is_some_and(|doing| doing.function == function::READ_INPUT) =>
+            {
+                if let Err(kind) = self.identity.input_silence() {
+                    return self.refuse(kind);
+                }
+            }
+            _ => {}
+        }
+        Some(error.into())
     }
 
     fn note_failure(&mut self, error: link::Error) {
+        let known = self.identity.known;
         match error {
             link::Error::Timeout { .. } => {
                 self.misses = self.misses.saturating_add(1);
@@ -101,6 +154,11 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             }
             link::Error::Port(_) | link::Error::Noise(_) => self.verify = true,
             _ => {}
+        }
+        // Somebody may have put another gripper there.
+        let away = matches!(error, link::Error::Port(_)) || self.misses >= timing::PATIENCE;
+        if known && away && self.config.check_family {
+            self.identity.forget();
         }
     }
 
@@ -122,6 +180,13 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         doing: &Doing<X>,
         now: Instant,
     ) -> Result<Status<X>, Error> {
+        if self.config.check_family
+            && F::PROBES.is_empty()
+            && Kind::of_status(block) == Some(Kind::TwoFinger)
+        {
+            self.verify = true;
+            return Err(Error::OtherGripper(Kind::TwoFinger));
+        }
         let judged = self
             .family
             .decode(block, now, self.config.check_reserved)
@@ -156,8 +221,14 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
 
     /// Starts the next request, if one may be sent now.
     pub(super) fn begin(&mut self, now: Instant) -> Result<(), Error> {
-        let wanted = self.wanted(now);
-        let Some(doing) = self.with_fresh_look(wanted, now) else {
+        let mut wanted = self.wanted(now);
+        let writes = wanted.function == function::READ_WRITE;
+        let mut probe = None;
+        if self.identity.is_open::<F, X>() && (writes || self.identity.asked) {
+            wanted = Doing::read((function::READ_HOLDING, F::REGISTERS));
+            probe = self.probe(now);
+        }
+        let Some(doing) = probe.or_else(|| self.with_fresh_look(wanted, now)) else {
             // Every look is owed; the first debt ends in time.
             self.next_start = self
                 .link
@@ -166,7 +237,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 .max(timing::after(now, timing::TICK));
             return Ok(());
         };
-        let reserved = if self.config.check_reserved {
+        let reserved = if self.config.check_reserved && doing.quantity <= F::REGISTERS {
             F::RESERVED
         } else {
             &[]
@@ -221,6 +292,22 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 _ => read,
             },
         }
+    }
+
+    /// The next read that tells the family and that no late reply can answer.
+    fn probe(&mut self, now: Instant) -> Option<Doing<X>> {
+        let from = self.identity.step;
+        for step in from..from + F::PROBES.len() {
+            let Some(&look) = F::PROBES.get(step % F::PROBES.len().max(1)) else {
+                continue;
+            };
+            let doing = Doing::read(look);
+            if self.link.debt(&doing.request(F::REGISTERS), now) != Debt::Open {
+                self.identity.step = (step + 1) % F::PROBES.len().max(1);
+                return Some(doing);
+            }
+        }
+        None
     }
 
     /// The wanted request in a look that no late reply can answer; a write that has none becomes a

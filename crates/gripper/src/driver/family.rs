@@ -48,6 +48,9 @@ pub trait Family<const X: usize>: sealed::Sealed {
     const RESERVED: &'static [u8];
     /// Reads of different look, best first: function code and number of registers.
     const READS: &'static [(u8, u16)];
+    /// Reads that tell the family before anything is written, in order; none where every whole
+    /// status does.
+    const PROBES: &'static [(u8, u16)];
     /// Numbers of registers an FC23 may read back, best first.
     const EXCHANGES: &'static [u16];
 
@@ -135,6 +138,7 @@ impl Family<4> for ThreeFingerFamily {
         (READ_HOLDING, 2),
         (READ_HOLDING, 1),
     ];
+    const PROBES: &'static [(u8, u16)] = &[];
     const EXCHANGES: &'static [u16] = &[8, 7];
 
     fn decode(
@@ -238,6 +242,15 @@ impl Family<1> for TwoFingerFamily {
         (READ_INPUT, 2),
         (READ_HOLDING, 1),
         (READ_INPUT, 1),
+    ];
+    // Eight, seven, six registers: a 3-Finger gripper answers; FC04: it does not.
+    const PROBES: &'static [(u8, u16)] = &[
+        (READ_HOLDING, 8),
+        (READ_HOLDING, 7),
+        (READ_INPUT, 3),
+        (READ_HOLDING, 3),
+        (READ_HOLDING, 6),
+        (READ_HOLDING, 3),
     ];
     const EXCHANGES: &'static [u16] = &[3];
 

@@ -8,6 +8,8 @@
 //! - **Activation only when told.** A gripper that is not ready is read, never written to. After a
 //!   request went unanswered the next one reads: a gripper that lost its power meanwhile would take
 //!   the rACT in a motion for an activation, and move.
+//! - **No write before the family is known.** A command for a 2-Finger gripper moves a 3-Finger one
+//!   too; reads tell the two apart, and a gripper of the other family is an error.
 //! - A motion goes out as one FC23 that writes the command block and reads the status block, at
 //!   most every 5 ms, and never when its stamp is older than 100 ms.
 //! - rMOD keeps what the gripper reports; rATR is not cleared under a release.
@@ -19,17 +21,19 @@
 mod cycle;
 mod echo;
 mod family;
+mod identity;
 mod task;
 
 pub use family::{Control, Family, ThreeFingerFamily, TwoFingerFamily};
 pub use task::{Failure, Outcome, Task};
 
-use crate::registers::{three_finger::Mode, two_finger};
+use crate::registers::{Kind, three_finger::Mode, two_finger};
 use crate::{Duration, Gripper, Instant, Motion, Status, link, timing};
 use cycle::Doing;
 use echo::{EchoWatch, Recent};
 use embedded_io::{Read, ReadReady, Write};
 use family::Snapshot;
+use identity::Identity;
 use task::Running;
 
 /// What a driver needs to know about its line.
@@ -48,6 +52,9 @@ pub struct Config {
     pub cycle: Duration,
     /// Whether a set reserved bit makes a status invalid. On, unless a gripper's firmware sets one.
     pub check_reserved: bool,
+    /// Whether a gripper of the other family is refused. On, unless a gripper's firmware answers
+    /// reads its manual does not name.
+    pub check_family: bool,
 }
 
 impl Default for Config {
@@ -59,6 +66,7 @@ impl Default for Config {
             silence: None,
             cycle: timing::CYCLE,
             check_reserved: true,
+            check_family: true,
         }
     }
 }
@@ -98,6 +106,8 @@ pub enum Error {
         /// Why it did not happen.
         why: Failure,
     },
+    /// A gripper of this other family answers. Nothing is written to it.
+    OtherGripper(Kind),
 }
 
 impl core::fmt::Display for Error {
@@ -105,6 +115,11 @@ impl core::fmt::Display for Error {
         match self {
             Self::Link(error) => write!(f, "{error}"),
             Self::Task { task, why } => write!(f, "{task} failed: {why}"),
+            Self::OtherGripper(kind) => write!(
+                f,
+                "a {} answers, another one than it is taken for: name its model",
+                kind.name()
+            ),
         }
     }
 }
@@ -148,6 +163,7 @@ pub struct Driver<S, F, const X: usize> {
     next_start: Instant,
     running: Option<Running>,
     outcome: Option<(Task, Outcome)>,
+    identity: Identity,
 }
 
 impl<S: Read + ReadReady + Write> ThreeFinger<S> {
@@ -202,7 +218,9 @@ impl<S: Read + ReadReady + Write> TwoFinger<S> {
 
 impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> {
     fn with_family(serial: S, config: Config, family: F) -> Self {
-        let longest_reply = 5 + 2 * usize::from(F::REGISTERS);
+        let probed = F::PROBES.iter().map(|&(_, registers)| registers).max();
+        let registers = F::REGISTERS.max(probed.unwrap_or(0));
+        let longest_reply = 5 + 2 * usize::from(registers);
         Self {
             link: link::Link::new(serial, config.link(longest_reply)),
             config,
@@ -220,6 +238,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             next_start: Instant::from_ticks(0),
             running: None,
             outcome: None,
+            identity: Identity::new(!config.check_family),
         }
     }
 
@@ -242,6 +261,17 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
     /// The line: its trace, its counters, its settings.
     pub fn link(&self) -> &link::Link<S> {
         &self.link
+    }
+
+    /// Finds out at once whether the gripper is of this family; else that is done before the first
+    /// write. Only reads: a 2-Finger one leaves two of them unanswered, which is counted.
+    pub fn identify(&mut self) {
+        self.identity.asked = true;
+    }
+
+    /// Whether nothing speaks against writing as far as the family goes.
+    pub fn is_identified(&self) -> bool {
+        !self.identity.is_open::<F, X>()
     }
 
     /// The newest status, if there is one.

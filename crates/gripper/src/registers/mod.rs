@@ -18,6 +18,46 @@ pub const COMMAND: u16 = 0x03E8;
 /// First register of the status block (read).
 pub const STATUS: u16 = 0x07D0;
 
+/// Which family a gripper is of: what decides its blocks, its axes and its functions.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Kind {
+    /// The 3-Finger Adaptive Gripper.
+    ThreeFinger,
+    /// 2F-85, 2F-140 or Hand-E; their registers do not say which.
+    TwoFinger,
+}
+
+impl Kind {
+    /// In words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::ThreeFinger => "3-Finger gripper",
+            Self::TwoFinger => "2-Finger gripper or Hand-E",
+        }
+    }
+
+    /// The family of a gripper that answered a read of eight status registers like this; `None`
+    /// where that cannot be told.
+    ///
+    /// Only the 3-Finger gripper has registers behind the third, and once it is ready none of its
+    /// axes reads 0: that is a mechanical stop outside the software limits. The 2-Finger ones hold 0
+    /// in byte 1 and in bits 1 and 2 of byte 0, the 3-Finger gripper in the high half of byte 2.
+    #[must_use]
+    pub fn of_status(block: &[u8; three_finger::BLOCK]) -> Option<Self> {
+        let ready = block[0] & 0x31 == 0x31;
+        let (axes, own_bits) = (&block[6..15], block[0] & 0x06 != 0 || block[1] != 0);
+        if reserved(block, &three_finger::STATUS_RESERVED).is_err() {
+            return (block[15] == 0 && !own_bits).then_some(Self::TwoFinger);
+        }
+        match axes.iter().any(|byte| *byte != 0) {
+            true => Some(Self::ThreeFinger),
+            false if own_bits => Some(Self::ThreeFinger),
+            false => ready.then_some(Self::TwoFinger),
+        }
+    }
+}
+
 /// A bit that is always 0 is set: byte and the bits concerned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ReservedBits {
@@ -95,5 +135,28 @@ impl Contact {
             Self::ContactClosing => "stopped by an object while closing",
             Self::AtPosition => "at the position asked for",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn eight_registers_tell_the_family_where_they_can() {
+        let mut block = [0; three_finger::BLOCK];
+        assert_eq!(Kind::of_status(&block), None, "reset, and all 0");
+        block[..6].copy_from_slice(&[0xF9, 0, 0, 0, 13, 0]);
+        assert_eq!(Kind::of_status(&block), Some(Kind::TwoFinger), "ready");
+        block[2] = 0x50;
+        assert_eq!(Kind::of_status(&block), Some(Kind::TwoFinger), "kFLT");
+        // Reset, but its axes stand somewhere; ready in every golden reply.
+        block = [0, 0, 0, 0, 7, 0, 0, 6, 0, 0, 6, 0, 0, 137, 0, 0];
+        assert_eq!(Kind::of_status(&block), Some(Kind::ThreeFinger));
+        block[15] = 1;
+        assert_eq!(Kind::of_status(&block), None, "neither has that");
+        block = [0; three_finger::BLOCK];
+        block[1] = 0xFF;
+        assert_eq!(Kind::of_status(&block), Some(Kind::ThreeFinger), "gDTx");
     }
 }
