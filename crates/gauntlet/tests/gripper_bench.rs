@@ -320,3 +320,177 @@ fn one_number_after_the_scissor_was_moved_on_its_own_waits_until_the_mode_has_it
         "{rest:?}"
     );
 }
+
+#[test]
+fn a_software_limit_far_from_the_target_ends_the_move_and_is_told() {
+    for (family, model, to, axis) in [
+        (Family::ThreeFinger, "3f", "250", "finger A"),
+        (Family::ThreeFinger, "3f", "250,80,80,137", "finger A"),
+        (Family::TwoFinger85, "2f85", "220", "fingers"),
+    ] {
+        let (gripper, _handle, path) = gripper(Config::of(family));
+        gripper.preset_active();
+        gripper.set_limits(0, Some((6.0, 120.0)));
+        let moved = [
+            "move", "--to", to, "--speed", "255", "--model", model, "--json",
+        ];
+        let output = bench(&moved, &path);
+        let said = json(&output);
+        assert_eq!(said["axes"][0]["position"], 120, "{said}");
+        let told = format!("{axis} stands at 120 and goes no further");
+        let errors = text(&output.stderr);
+        assert!(errors.contains(&told), "{errors}");
+        // It was led, not sent: asked for no more than 40 counts beyond the limit.
+        assert_eq!(said["axes"][0]["asked"], 160, "{said}");
+    }
+}
+
+#[test]
+fn another_family_than_the_one_named_is_refused_before_anything_is_written() {
+    let ready = ["status", "activate", "reset", "release", "watch"];
+    let mut cases = 0;
+    for (family, models, kind, option) in [
+        (
+            Family::ThreeFinger,
+            &["2f85", "2f140", "hande"][..],
+            "3-Finger gripper answers",
+            "--model 3f",
+        ),
+        (
+            Family::TwoFinger85,
+            &["3f"][..],
+            "2-Finger gripper or Hand-E answers",
+            "--model 2f85",
+        ),
+    ] {
+        for model in models {
+            for active in [false, true] {
+                let (gripper, _handle, path) = gripper(Config::of(family));
+                if active {
+                    gripper.preset_active();
+                }
+                let moved = &["move", "--to", "200"][..];
+                for verb in ready.iter().map(std::slice::from_ref).chain([moved]) {
+                    let refused = bench(&[verb, &["--model", model]].concat(), &path);
+                    let error = refusal(&refused, 1);
+                    assert!(error.contains(kind), "{error}");
+                    assert!(text(&refused.stderr).contains(option));
+                    cases += 1;
+                }
+                assert_eq!((gripper.writes(), gripper.motions()), (0, 0), "{model}");
+            }
+        }
+    }
+    println!("{cases} commands with the wrong --model: refused, 0 writes");
+}
+
+#[test]
+fn ctrl_c_ends_every_verb_while_nobody_answers() {
+    let verbs: [&[&str]; 7] = [
+        &["status"],
+        &["activate"],
+        &["move", "--to", "100"],
+        &["mode", "pinch"],
+        &["release"],
+        &["reset"],
+        &["watch"],
+    ];
+    for verb in verbs {
+        let (gripper, _handle, path) = gripper(Config::default());
+        gripper.mute(u32::MAX);
+        let child = command(&[&["gripper"], verb, &["--gripper", &path]].concat())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let end = Instant::now() + Duration::from_secs(30);
+        while gripper.requests().0 == 0 {
+            assert!(Instant::now() < end, "it never asked");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        interrupt(&child);
+        let output = finish(child);
+        // The wait it cuts short would end with another error.
+        let error = refusal(&output, 1);
+        assert!(
+            error.contains("interrupted before the gripper answered"),
+            "{error}"
+        );
+        assert_eq!(gripper.writes(), 0);
+    }
+}
+
+#[test]
+fn ctrl_c_ends_a_watch_which_has_done_its_work() {
+    let (_gripper, _handle, path) = gripper(Config::default());
+    let mut child = command(&["gripper", "watch", "--gripper", &path])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let said = support::until_line(child.stdout.take().unwrap(), "not activated");
+    interrupt(&child);
+    assert_eq!(
+        support::wait(&mut child).code(),
+        Some(0),
+        "a watch has no end of its own"
+    );
+    assert!(said.join().unwrap().contains("finger A"));
+}
+
+#[test]
+fn ctrl_c_during_a_mode_change_or_a_release_says_that_it_goes_on() {
+    for verb in [&["mode", "pinch"][..], &["release"][..]] {
+        let (gripper, handle, path) = gripper(Config::default());
+        gripper.preset_active();
+        // Something to open from.
+        gripper.set_position(0, 200.0);
+        let child = command(&[&["gripper"], verb, &["--gripper", &path]].concat())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let end = Instant::now() + Duration::from_secs(30);
+        while gripper.motions() == 0 {
+            assert!(Instant::now() < end, "it never moved");
+            gripper.run_until(handle.clock().now());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        interrupt(&child);
+        assert!(refusal(&finish(child), 1).contains("goes on by itself"));
+    }
+}
+
+#[test]
+fn watch_names_the_layer_that_fails_on_the_network_as_words_and_as_json() {
+    for more in [&[][..], &["--json"]] {
+        let gripper = VirtualGripper::new(Config::default());
+        let server = tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();
+        let place = format!("tcp:{}", server.address());
+        let mut child = command(&[&["gripper", "watch", "--gripper", &place], more].concat())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let said = support::until_line(child.stdout.take().unwrap(), "not activated");
+        drop(server);
+        std::thread::sleep(Duration::from_millis(1_500));
+        interrupt(&child);
+        assert_eq!(support::wait(&mut child).code(), Some(0));
+        let said = said.join().unwrap();
+        assert!(!said.contains("serial port"), "{said}");
+        let network = ["closed the connection", "refused", "not connected"];
+        assert!(network.iter().any(|words| said.contains(words)), "{said}");
+        if more == ["--json"] {
+            let lines = said.lines().map(serde_json::from_str::<serde_json::Value>);
+            let errors: Vec<_> = lines
+                .map(Result::unwrap)
+                .filter(|v| v["error"].is_string())
+                .collect();
+            assert!(
+                !errors.is_empty() && errors.iter().all(|v| v["try"].is_string()),
+                "{said}"
+            );
+        }
+    }
+}

@@ -115,6 +115,29 @@ fn the_first_command_of_a_hold_moves_no_axis_and_lets_nothing_go() {
 }
 
 #[test]
+fn a_finger_at_a_software_limit_far_from_what_it_was_told_stands_there_and_is_held_there() {
+    let mut bench = three();
+    bench.truth.preset_active();
+    bench.truth.set_limits(0, Some((6.0, 120.0)));
+    let status = bench.go([250, 200, 200, 137]);
+    assert_eq!(
+        (status.contact[0], status.echo[0], status.position[0]),
+        (Contact::AtPosition, 250, 120)
+    );
+    assert!(bench.driver.accepted(), "it repeats the motion");
+    // The hold is where it is, not where it was told to be: the limit may move, the finger must not.
+    assert_eq!(status.hold(), [120, 200, 200, 137]);
+    let held = bench.go(status.hold());
+    bench.truth.set_limits(0, None);
+    let status = bench.for_ms(500);
+    assert_eq!(
+        (held.position, status.position),
+        (status.hold(), held.position)
+    );
+    assert!((bench.truth.positions()[0] - 120.0).abs() < 1.0);
+}
+
+#[test]
 fn all_modes_can_be_set_and_are_kept() {
     let mut bench = three();
     bench.activate();

@@ -208,6 +208,11 @@ impl VirtualGripper {
         self.with_axis(index, |a| a.inner_object = at);
     }
 
+    /// Puts the software limits of axis `index` at these counts, or back where the model has them.
+    pub fn set_limits(&self, index: usize, limits: Option<(f32, f32)>) {
+        self.with_axis(index, |a| a.limits = limits);
+    }
+
     /// Shows fault `code` (0 to F) from the next refresh on; a major one stops everything until rACT
     /// falls, the others stay until `None`.
     pub fn set_fault(&self, code: Option<u8>) {

@@ -127,6 +127,8 @@ impl Port {
             baud: 1_000_000,
             response: gripper::Duration::from_ticks((millis + 50) * 1_000),
             silence: Some(gripper::Duration::from_ticks(100)),
+            // Only the 3-Finger gripper speaks Modbus TCP.
+            check_family: false,
             ..gripper::driver::Config::default()
         }
     }

@@ -48,6 +48,8 @@ pub(super) struct Axis {
     pub object: Option<f32>,
     /// Opening meets something here, counts.
     pub inner_object: Option<f32>,
+    /// Software limits in place of the model's, counts.
+    pub limits: Option<(f32, f32)>,
     pub detection: Detection,
     contact: Option<Contact>,
     moving: bool,
@@ -63,6 +65,7 @@ impl Axis {
             position,
             object: None,
             inner_object: None,
+            limits: None,
             detection: Detection::AtPosition,
             contact: None,
             moving: false,
@@ -76,7 +79,7 @@ impl Axis {
     /// another axis; returns whether that happened.
     pub fn step(&mut self, order: &Order, seconds: f32, blocked_at: impl Fn(f32) -> bool) -> bool {
         self.squeeze = self.squeeze.saturating_sub(1);
-        let (open, closed) = order.limits;
+        let (open, closed) = self.limits.unwrap_or(order.limits);
         let target = order.target.clamp(open, closed);
         if self.held_by_contact(order) {
             self.still();

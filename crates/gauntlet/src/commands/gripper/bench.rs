@@ -45,6 +45,10 @@ pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
     fn facts(&self) -> Vec<(&'static str, String)>;
     /// What is wrong with the line, where it can tell better than the driver.
     fn line_error(&mut self) -> Option<tcp::Error>;
+    /// Finds out whether the gripper is of this family before anything else.
+    fn identify(&mut self);
+    /// Whether it is, as far as that can be told.
+    fn is_identified(&self) -> bool;
 }
 
 impl Bench<4> for ThreeFinger<Line> {
@@ -100,6 +104,12 @@ impl Bench<4> for ThreeFinger<Line> {
     fn line_error(&mut self) -> Option<tcp::Error> {
         self.serial_mut().error()
     }
+    fn identify(&mut self) {
+        ThreeFinger::identify(self);
+    }
+    fn is_identified(&self) -> bool {
+        ThreeFinger::is_identified(self)
+    }
 }
 
 impl Bench<1> for TwoFinger<Line> {
@@ -146,6 +156,12 @@ impl Bench<1> for TwoFinger<Line> {
     fn line_error(&mut self) -> Option<tcp::Error> {
         self.serial_mut().error()
     }
+    fn identify(&mut self) {
+        TwoFinger::identify(self);
+    }
+    fn is_identified(&self) -> bool {
+        TwoFinger::is_identified(self)
+    }
 }
 
 /// Whoever waits: the clock, and Ctrl-C.
@@ -191,7 +207,7 @@ impl Waiter {
         None
     }
 
-    /// The first status.
+    /// The first status of a gripper that is of the driver's family.
     ///
     /// # Errors
     /// What came instead of one, as the driver says it.
@@ -200,14 +216,19 @@ impl Waiter {
         driver: &mut B,
     ) -> Result<Status<X>, Option<gripper::Error>> {
         let mut last = None;
-        self.pump(driver, ANSWER_WAIT, |_, _, heard| match heard {
-            Some(Ok(status)) => ControlFlow::Break(status),
+        self.pump(driver, ANSWER_WAIT, |driver, _, heard| match heard {
+            Some(Ok(status)) if driver.is_identified() => ControlFlow::Break(Some(status)),
             Some(Err(error)) => {
                 last = Some(error);
-                ControlFlow::Continue(())
+                match error {
+                    // It will not become another one.
+                    gripper::Error::OtherGripper(_) => ControlFlow::Break(None),
+                    _ => ControlFlow::Continue(()),
+                }
             }
-            None => ControlFlow::Continue(()),
+            _ => ControlFlow::Continue(()),
         })
+        .flatten()
         .ok_or(last)
     }
 
@@ -217,6 +238,7 @@ impl Waiter {
     /// A failure that says why it did not happen, and what to do.
     pub fn finish<B: Bench<X>, const X: usize>(&self, driver: &mut B) -> Result<()> {
         let mut last = None;
+        let written = driver.counters().writes;
         let ended = self.pump(driver, TASK_WAIT, |driver, _, heard| {
             last = heard.and_then(Result::err).or(last);
             match driver.outcome() {
@@ -227,6 +249,9 @@ impl Waiter {
         match ended {
             Some((_, Outcome::Done)) => Ok(()),
             Some((task, Outcome::Failed(why))) => Err(failed(task, why, last)),
+            _ if self.interrupt.asked() && driver.counters().writes == written => {
+                Err(Failure::interrupted("before the gripper was told anything").into())
+            }
             _ if self.interrupt.asked() => Err(Failure::new(
                 "interrupted; the gripper goes on by itself with what it has begun",
                 "`gauntlet gripper status`",

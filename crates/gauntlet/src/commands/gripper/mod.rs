@@ -11,7 +11,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::registers::Severity;
+use gripper::registers::{Kind, Severity};
 use gripper::{Activation, Status};
 
 use crate::failure::Failure;
@@ -99,9 +99,13 @@ fn first_status<B: Bench<X>, const X: usize>(
     target: &Target,
     config: gripper::driver::Config,
 ) -> Result<Status<X>> {
-    waiter
-        .status(driver)
-        .map_err(|last| no_answer(target, driver, config, last))
+    driver.identify();
+    waiter.status(driver).map_err(|last| {
+        if waiter.interrupt.asked() {
+            return Failure::interrupted("before the gripper answered").into();
+        }
+        no_answer(target, driver, config, last)
+    })
 }
 
 /// A verb under way.
@@ -152,6 +156,21 @@ fn no_answer<B: Bench<X>, const X: usize>(
 ) -> anyhow::Error {
     let place = target.gripper.display();
     let (name, _) = driver.names();
+    if let Some(gripper::Error::OtherGripper(kind)) = last {
+        return Failure::new(
+            format!(
+                "a {} answers on {place}, not a {name}: nothing was written to it",
+                kind.name()
+            ),
+            match kind {
+                Kind::ThreeFinger => "--model 3f",
+                Kind::TwoFinger => {
+                    "--model 2f85, 2f140 or hande: which of them it is no register says"
+                }
+            },
+        )
+        .into();
+    }
     if let Some(error) = driver.line_error() {
         let what = format!(
             "no {name} answers at {place} as unit {}: {error}",
@@ -160,6 +179,20 @@ fn no_answer<B: Bench<X>, const X: usize>(
         return Failure::new(what, error.next_step()).into();
     }
     let why = last.map_or_else(String::new, |error| format!(": {error}"));
+    let refused = matches!(
+        last,
+        Some(gripper::Error::Link(gripper::link::Error::Exception(_)))
+    );
+    if refused && target.model == Model::ThreeFinger {
+        return Failure::new(
+            format!(
+                "no {name} answers on {place} as unit {}{why}; a {name} sends no exceptions",
+                config.unit
+            ),
+            "--model 2f85, 2f140 or hande, if it is one of them",
+        )
+        .into();
+    }
     Failure::new(
         format!(
             "no {name} answers on {place} as unit {} at {} baud{why}",
@@ -228,6 +261,10 @@ impl<B> Doing<'_, B> {
         B: Bench<X>,
     {
         let status = self.waiter.status(&mut self.driver).map_err(|_| {
+            if self.waiter.interrupt.asked() {
+                let what = "interrupted after it was done, before the state could be read again";
+                return Failure::new(what, "`gauntlet gripper status`");
+            }
             Failure::new(
                 "the gripper stopped answering",
                 "`gauntlet doctor --gripper …`",
@@ -263,13 +300,19 @@ impl<B> Doing<'_, B> {
                         table::json(driver, &status, &place, raw).to_string()
                     }
                     Some(Ok(status)) => table::line(driver, &status, raw),
-                    Some(Err(error)) if json => {
-                        serde_json::json!({ "error": error.to_string() }).to_string()
+                    Some(Err(error)) => {
+                        let (what, next) = match driver.line_error() {
+                            Some(error) => (error.to_string(), Some(error.next_step())),
+                            None => (error.to_string(), None),
+                        };
+                        match (json, next) {
+                            (false, _) => what,
+                            (true, None) => serde_json::json!({ "error": what }).to_string(),
+                            (true, Some(next)) => {
+                                serde_json::json!({ "error": what, "try": next }).to_string()
+                            }
+                        }
                     }
-                    Some(Err(error)) => match driver.line_error() {
-                        Some(error) => error.to_string(),
-                        None => error.to_string(),
-                    },
                 };
                 let due = shown.as_ref().is_none_or(|(at, last)| {
                     let since = at.elapsed();

@@ -13,7 +13,7 @@ use gripper::registers::Severity;
 use gripper::{Activation, Contact, Motion, Status, space};
 
 use super::bench::Bench;
-use super::{Doing, Move};
+use super::{Doing, Move, table};
 use crate::failure::Failure;
 
 /// Most counts a command may be from the measured position.
@@ -26,6 +26,9 @@ const SILENCE: Duration = Duration::from_secs(1);
 const HOLD_WAIT: Duration = Duration::from_millis(500);
 /// Statuses in a row that must say "standing" before the motion counts as over.
 const CALM: u32 = 3;
+/// The same for an axis that says it is where it was told to be, and is not: a software limit. Longer, because an axis
+/// about to start looks like that.
+const LIMIT_CALM: u32 = 30;
 
 /// Which axes the numbers on the command line are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -117,7 +120,19 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
     let ended = approach(doing, options, axes, target, &mut newest);
     doing.driver.set_motion(None, doing.waiter.clock.now());
     match ended {
-        Some(End::Stands) => Ok(()),
+        Some(End::Stands) => {
+            let (_, names) = doing.driver.names();
+            for (axis, name) in names.iter().enumerate() {
+                let (here, there) = (newest.position[axis], target[axis]);
+                let limited = newest.contact[axis] == Contact::AtPosition && axes.moves(axis);
+                if limited && here.abs_diff(there) > table::LIMITS {
+                    doing.tell.say(format_args!(
+                        "{name} stands at {here} and goes no further towards {there}: its software limit lies there"
+                    ));
+                }
+            }
+            Ok(())
+        }
         Some(End::Refused(failure)) => {
             // The last command may lie ahead of the axes still.
             if newest.activation == Activation::Ready {
@@ -167,6 +182,7 @@ fn approach<B: Bench<X>, const X: usize>(
     let waiter = doing.waiter.clone();
     let (mut calm, mut heard_at) = (0, Instant::now());
     let mut command = next_command(target, newest, axes);
+    let mut limited = Limited::new(newest);
     waiter.pump(&mut doing.driver, MOVE_WAIT, |driver, now, heard| {
         if let Some(Ok(status)) = heard {
             (*newest, heard_at) = (status, Instant::now());
@@ -175,9 +191,10 @@ fn approach<B: Bench<X>, const X: usize>(
             {
                 return ControlFlow::Break(End::Refused(failure));
             }
+            limited.note(&status, &command, driver.accepted());
             let stands = |axis: usize| match status.contact[axis] {
                 Contact::Moving => false,
-                Contact::AtPosition => command[axis] == target[axis],
+                Contact::AtPosition => command[axis] == target[axis] || limited.is_at_limit(axis),
                 Contact::ContactOpening | Contact::ContactClosing => true,
             };
             let all = (0..X).filter(|axis| axes.moves(*axis)).all(stands);
@@ -197,6 +214,40 @@ fn approach<B: Bench<X>, const X: usize>(
         driver.set_motion(Some(motion(axes.block(command), options)), now);
         ControlFlow::Continue(())
     })
+}
+
+/// For how many statuses in a row each axis has stood short of what it was told, saying that it is there.
+struct Limited<const X: usize> {
+    position: [u8; X],
+    calm: [u32; X],
+}
+
+impl<const X: usize> Limited<X> {
+    fn new(status: &Status<X>) -> Self {
+        Self {
+            position: status.position,
+            calm: [0; X],
+        }
+    }
+
+    /// `accepted`: the gripper repeats this command; before that its contacts speak of an earlier one.
+    fn note(&mut self, status: &Status<X>, command: &[u8; X], accepted: bool) {
+        for axis in 0..X {
+            let here = status.position[axis];
+            let short = status.contact[axis] == Contact::AtPosition
+                && here != command[axis]
+                && here == self.position[axis];
+            self.calm[axis] = match accepted && short {
+                true => self.calm[axis].saturating_add(1),
+                false => 0,
+            };
+            self.position[axis] = here;
+        }
+    }
+
+    fn is_at_limit(&self, axis: usize) -> bool {
+        self.calm.get(axis).is_some_and(|calm| *calm >= LIMIT_CALM)
+    }
 }
 
 /// The next position to ask for: towards `target`, at most [`LEAD`] from where each axis is, and such that no finger can
@@ -346,6 +397,35 @@ mod tests {
         assert_eq!(next, [50, 60, 70, 137]);
         let next = next_command([250; 4], &status([10, 20, 30, 137]), Axes::Scissor);
         assert_eq!(Axes::Scissor.block(next), [177, 20, 30, 177]);
+    }
+
+    #[test]
+    fn an_axis_that_says_it_is_there_and_is_not_is_at_its_limit_only_after_a_while() {
+        let mut limited = Limited::new(&status([150]));
+        for _ in 1..LIMIT_CALM {
+            limited.note(&status([150]), &[190], true);
+        }
+        assert!(!limited.is_at_limit(0));
+        limited.note(&status([150]), &[190], true);
+        assert!(limited.is_at_limit(0));
+        // Not accepted, on its way, touching something, or where it was told to be: no limit.
+        let mut moving = status([150]);
+        moving.contact = [Contact::Moving];
+        let mut touching = status([150]);
+        touching.contact = [Contact::ContactClosing];
+        for (status, command, accepted) in [
+            (status([150]), [190], false),
+            (status([151]), [191], true),
+            (moving, [190], true),
+            (touching, [190], true),
+            (status([150]), [150], true),
+        ] {
+            limited.note(&status, &command, accepted);
+            assert!(!limited.is_at_limit(0));
+            for _ in 0..LIMIT_CALM {
+                limited.note(&super::tests::status([150]), &[190], true);
+            }
+        }
     }
 
     #[test]

@@ -7,7 +7,7 @@ use super::bench::Bench;
 use crate::words;
 
 /// Software limits lie inside the mechanical stops, at most so many counts from either end.
-const LIMITS: u8 = 30;
+pub const LIMITS: u8 = 30;
 
 /// What an axis does. gDTx says nothing while the gripper follows no position.
 pub fn axis_words<const X: usize>(status: &Status<X>, axis: usize) -> &'static str {
