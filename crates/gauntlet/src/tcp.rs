@@ -11,6 +11,7 @@
 
 mod address;
 mod port;
+mod stream;
 mod task;
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -56,6 +57,9 @@ pub enum Error {
     /// The other side ended the connection.
     #[error("the other side closed the connection")]
     Closed,
+    /// The other side ended the connection inside an answer.
+    #[error("the other side ended the connection inside an answer")]
+    Cut,
     /// What came is no Modbus TCP frame: its header or length is impossible.
     #[error("what came is no valid Modbus TCP frame ({0})")]
     Malformed(String),
@@ -85,7 +89,7 @@ impl Error {
                 "`ping` the gripper; its power, the network cable, and that the PC has an address in the same network"
             }
             Self::Timeout => "--unit: another unit number (2 by default); the gripper's power",
-            Self::NotConnected | Self::Closed => {
+            Self::NotConnected | Self::Closed | Self::Cut => {
                 "ending other programs that are connected to the gripper, then again"
             }
             Self::Malformed(_) | Self::Mismatch(_) | Self::Unsupported => {
@@ -103,7 +107,7 @@ impl embedded_io::Error for Error {
             Self::Name(_) | Self::NotConnected => ErrorKind::NotConnected,
             Self::Refused => ErrorKind::ConnectionRefused,
             Self::Unreachable | Self::Timeout => ErrorKind::TimedOut,
-            Self::Closed => ErrorKind::ConnectionReset,
+            Self::Closed | Self::Cut => ErrorKind::ConnectionReset,
             Self::Malformed(_) | Self::Mismatch(_) => ErrorKind::InvalidData,
             Self::Unsupported => ErrorKind::Unsupported,
             Self::Exception(_) | Self::System(_) => ErrorKind::Other,

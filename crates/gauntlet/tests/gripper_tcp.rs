@@ -111,6 +111,56 @@ fn scripted(
     (port, questions)
 }
 
+/// Ready, open, following nothing: the answer to FC04.
+const READY: &str = "04 10 31 FF 00 00 06 00 00 06 00 00 06 00 00 89 00 00";
+
+fn mbap(id: [u8; 2], pdu: &[u8]) -> Vec<u8> {
+    let mut frame = vec![id[0], id[1], 0, 0, 0, pdu.len() as u8 + 1, UNIT];
+    frame.extend_from_slice(pdu);
+    frame
+}
+
+/// What a server does with a request.
+enum Act {
+    Answer(Vec<u8>),
+    /// Sends these bytes and ends the connection.
+    End(Vec<u8>),
+    Hang,
+}
+
+/// Serves one connection after the other by `act`: number of the connection and PDU in. What was asked on which
+/// connection is told to the receiver.
+fn by_connection(
+    mut act: impl FnMut(usize, [u8; 2], &[u8]) -> Act + Send + 'static,
+) -> (u16, Receiver<(usize, Vec<u8>)>) {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let port = listener.local_addr().unwrap().port();
+    let (asked, questions) = channel();
+    std::thread::spawn(move || {
+        for (number, stream) in listener.incoming().enumerate() {
+            let mut stream = stream.unwrap();
+            let mut header = [0; 7];
+            while stream.read_exact(&mut header).is_ok() {
+                let mut pdu = vec![0; usize::from(header[5]) - 1];
+                if stream.read_exact(&mut pdu).is_err()
+                    || asked.send((number, pdu.clone())).is_err()
+                {
+                    break;
+                }
+                match act(number, [header[0], header[1]], &pdu) {
+                    Act::Answer(frame) => stream.write_all(&frame).unwrap(),
+                    Act::Hang => {}
+                    Act::End(bytes) => {
+                        stream.write_all(&bytes).unwrap();
+                        break;
+                    }
+                }
+            }
+        }
+    });
+    (port, questions)
+}
+
 /// A golden reply with the transaction id that was asked.
 fn with_id(frame: &[u8], id: [u8; 2]) -> Vec<u8> {
     [&id[..], &frame[2..]].concat()
@@ -302,8 +352,146 @@ fn a_write_confirmed_for_other_registers_is_a_typed_error() {
     assert!(questions.try_iter().any(|pdu| pdu[0] == 0x10));
 }
 
+/// The RTU frame of an FC23 whose block is `mark`, as the driver gives it to the port.
+fn marked(mark: u8) -> Vec<u8> {
+    let block = [mark; 16];
+    let request = gripper::rtu::Request::ReadWrite {
+        read_address: STATUS,
+        read_quantity: 8,
+        write_address: COMMAND,
+        values: gripper::rtu::Registers::from_bytes(&block).unwrap(),
+    };
+    let mut frame = vec![0; request.buffer_len()];
+    request.emit(UNIT, &mut frame).unwrap();
+    frame
+}
+
 #[test]
-fn silence_ends_within_the_deadline_and_no_block_of_before_leaves_later() {
+fn a_block_handed_over_for_a_lost_connection_never_leaves_on_the_next() {
+    use embedded_io::{ReadReady, Write as _};
+    // Each case: what the first connection does with the first block, while the second one waits in the queue. Both
+    // blocks are fresh for 200 ms, the next connection is there after 100 ms.
+    for (case, end) in [("closed", true), ("silent", false)] {
+        let (port, questions) = by_connection(move |number, id, pdu| match (number, pdu[0]) {
+            (0, _) if end => {
+                // So that the second block is in the queue.
+                std::thread::sleep(Duration::from_millis(30));
+                Act::End(Vec::new())
+            }
+            (0, _) => Act::Hang,
+            (_, 4) => Act::Answer(mbap(id, &hex(READY))),
+            _ => Act::Answer(mbap(id, &pdu[..5])),
+        });
+        let mut line = line(port);
+        assert_eq!(line.write(&marked(0xA1)), Ok(29));
+        // The task has taken the first job; this one waits behind it.
+        let (_, first) = questions.recv_timeout(PATIENCE).unwrap();
+        assert_eq!(first[6..], [0xA1; 16]);
+        if !end {
+            std::thread::sleep(Duration::from_millis(150));
+        }
+        let queued = line.write(&marked(0xA2));
+        let deadline = Instant::now() + PATIENCE;
+        while line.connections() < 2 {
+            assert!(Instant::now() < deadline, "{:?}", line.error());
+            let _ = line.read_ready();
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        // Longer than any job lives.
+        std::thread::sleep(Duration::from_millis(400));
+        let _ = line.read_ready();
+        // What is handed over now does leave: the connection works.
+        let sent = Instant::now();
+        while line.write(&marked(0xA3)).is_err() {
+            assert!(sent.elapsed() < PATIENCE, "{:?}", line.error());
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        let later = loop {
+            let (number, pdu) = questions.recv_timeout(PATIENCE).unwrap();
+            if pdu[0] == 0x10 {
+                break (number, pdu);
+            }
+        };
+        println!(
+            "{case}: queued {queued:?}, then on connection {}: {:02X?}",
+            later.0, later.1
+        );
+        assert!(later.0 >= 1);
+        assert_eq!(later.1[6..], [0xA3; 16], "{case}: an old block left later");
+    }
+}
+
+#[test]
+fn a_stream_that_ends_inside_a_frame_is_told_as_such_and_made_anew() {
+    let whole = mbap([0, 0], &hex(READY)).len();
+    for cut in 0..whole {
+        for answered in [0, 3] {
+            let mut count = 0;
+            let (port, _questions) = by_connection(move |number, id, _| {
+                let frame = mbap(id, &hex(READY));
+                count += 1;
+                match number {
+                    0 if count > answered => Act::End(frame[..cut].to_vec()),
+                    _ => Act::Answer(frame),
+                }
+            });
+            let mut us = driver(port);
+            let mut failed = 0;
+            until(&mut us, None, |_, heard| {
+                failed += u32::from(matches!(heard, Some(Err(_))));
+                failed > 0
+            });
+            let error = us.0.serial_mut().error();
+            let expected = if cut == 0 { Error::Closed } else { Error::Cut };
+            assert_eq!(error, Some(expected), "after {cut} of {whole} bytes");
+            until(&mut us, None, |_, heard| matches!(heard, Some(Ok(_))));
+            assert_eq!(us.0.serial_mut().connections(), 2);
+            assert_eq!(us.0.serial_mut().error(), None);
+        }
+    }
+    println!(
+        "{} streams that end after 0 to {} bytes of an answer: told, and made anew",
+        2 * whole,
+        whole - 1
+    );
+}
+
+#[test]
+fn an_answer_that_stops_inside_a_frame_while_the_stream_stays_ends_at_the_deadline() {
+    let (port, _questions) = by_connection(|number, id, _| {
+        let frame = mbap(id, &hex(READY));
+        match number {
+            0 => Act::Answer(frame[..11].to_vec()),
+            _ => Act::Answer(frame),
+        }
+    });
+    let mut us = driver(port);
+    let mut failed = false;
+    until(&mut us, None, |_, heard| {
+        failed |= matches!(heard, Some(Err(_)));
+        failed
+    });
+    assert_eq!(us.0.serial_mut().error(), Some(Error::Timeout));
+    until(&mut us, None, |_, heard| matches!(heard, Some(Ok(_))));
+    assert_eq!(us.0.serial_mut().connections(), 2);
+}
+
+#[test]
+fn a_client_that_leaves_inside_a_request_does_not_end_the_virtual_gripper() {
+    let gripper = VirtualGripper::new(Config::default());
+    let server = tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();
+    let request = hex("71 EE 00 00 00 0D 02 10 03 E8 00 03 06 09 00 00 FF FF FF");
+    for cut in 0..request.len() {
+        let mut stream = TcpStream::connect(server.address()).unwrap();
+        stream.write_all(&request[..cut]).unwrap();
+    }
+    let mut us = driver(server.address().port());
+    until(&mut us, None, |_, heard| matches!(heard, Some(Ok(_))));
+    assert_eq!(gripper.writes(), 0, "no half of a request counts");
+}
+
+#[test]
+fn silence_ends_within_the_deadline_and_only_reads_leave() {
     let (port, questions) = scripted(|_, _| None);
     let mut us = driver(port);
     let start = Instant::now();

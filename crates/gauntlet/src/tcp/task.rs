@@ -13,6 +13,7 @@ use tokio::time::{Instant, timeout, timeout_at};
 use tokio_modbus::client::{Client, Context, tcp::attach_slave};
 use tokio_modbus::{Request, Response, Slave};
 
+use super::stream::{Seen, Watched};
 use super::{Address, BLOCK, CONNECT, Error, RECONNECT_FIRST, RECONNECT_LAST, State, lock};
 
 /// Registers of a block.
@@ -72,9 +73,9 @@ pub(super) async fn run(
         };
         match attempt {
             Err(error) => lock(&answers.state).error = Some(error),
-            Ok(context) => {
+            Ok(connection) => {
                 answers.connected(true);
-                let (exchanged, open) = serve(context, &mut jobs, &mut answers).await;
+                let (exchanged, open) = serve(connection, &mut jobs, &mut answers).await;
                 answers.connected(false);
                 if !open {
                     return;
@@ -105,14 +106,24 @@ async fn refuse(jobs: &mut mpsc::Receiver<Job>, answers: &mut Answers) {
     }
 }
 
-async fn connect(address: &Address, unit: u8) -> Result<Context, Error> {
+/// A connection, and what came over it.
+struct Connection {
+    context: Context,
+    seen: Arc<Seen>,
+}
+
+async fn connect(address: &Address, unit: u8) -> Result<Connection, Error> {
     let attempt = async {
         let found = lookup_host((address.host.as_str(), address.port)).await;
         let targets = found.map_err(|_| Error::Name(address.host.clone()))?;
         let mut error = Error::Name(address.host.clone());
         for target in targets {
             match TcpStream::connect(target).await.and_then(prepared) {
-                Ok(stream) => return Ok(attach_slave(stream, Slave(unit))),
+                Ok(stream) => {
+                    let (stream, seen) = Watched::new(stream);
+                    let context = attach_slave(stream, Slave(unit));
+                    return Ok(Connection { context, seen });
+                }
                 Err(cause) => error = system(&cause),
             }
         }
@@ -132,7 +143,7 @@ fn prepared(stream: TcpStream) -> std::io::Result<TcpStream> {
 
 /// Serves jobs over one connection. Returns whether an exchange succeeded, and whether there may be more jobs.
 async fn serve(
-    mut context: Context,
+    mut connection: Connection,
     jobs: &mut mpsc::Receiver<Job>,
     answers: &mut Answers,
 ) -> (bool, bool) {
@@ -144,7 +155,7 @@ async fn serve(
             answers.give(job.number, Err(Error::Timeout));
             continue;
         } else {
-            let exchange = exchange(&mut context, job.write.as_ref());
+            let exchange = exchange(&mut connection, job.write.as_ref());
             timeout_at(until, exchange)
                 .await
                 .unwrap_or(Err(Error::Timeout))
@@ -160,13 +171,13 @@ async fn serve(
         }
     }
     // Nothing is under way: the last answer has come.
-    let _ = timeout(Duration::from_millis(50), context.disconnect()).await;
+    let _ = timeout(Duration::from_millis(50), connection.context.disconnect()).await;
     (exchanged, false)
 }
 
 /// Writes the command block, if there is one, and reads the status block.
 async fn exchange(
-    context: &mut Context,
+    connection: &mut Connection,
     write: Option<&[u8; BLOCK]>,
 ) -> Result<[u8; BLOCK], Error> {
     if let Some(block) = write {
@@ -175,13 +186,13 @@ async fn exchange(
             .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
             .collect();
         let request = Request::WriteMultipleRegisters(COMMAND, words.into());
-        match call(context, request).await? {
+        match call(connection, request).await? {
             Response::WriteMultipleRegisters(COMMAND, REGISTERS) => {}
             other => return Err(mismatch(&other)),
         }
     }
     let request = Request::ReadInputRegisters(STATUS, REGISTERS);
-    let words = match call(context, request).await? {
+    let words = match call(connection, request).await? {
         Response::ReadInputRegisters(words) if words.len() == BLOCK / 2 => words,
         other => return Err(mismatch(&other)),
     };
@@ -204,9 +215,10 @@ fn mismatch(response: &Response) -> Error {
     })
 }
 
-async fn call(context: &mut Context, request: Request<'_>) -> Result<Response, Error> {
+async fn call(connection: &mut Connection, request: Request<'_>) -> Result<Response, Error> {
     use tokio_modbus::{Error as Modbus, ProtocolError};
-    match context.call(request).await {
+    connection.seen.begin();
+    match connection.context.call(request).await {
         Ok(Ok(response)) => Ok(response),
         Ok(Err(exception)) => Err(Error::Exception(exception.into())),
         Err(Modbus::Protocol(ProtocolError::HeaderMismatch { message, .. })) => {
@@ -215,15 +227,15 @@ async fn call(context: &mut Context, request: Request<'_>) -> Result<Response, E
         Err(Modbus::Protocol(ProtocolError::FunctionCodeMismatch { request, .. })) => Err(
             Error::Mismatch(format!("another function than {}", request.value())),
         ),
-        Err(Modbus::Transport(cause)) => Err(transport(&cause)),
+        Err(Modbus::Transport(cause)) => {
+            Err(connection.seen.end().unwrap_or_else(|| transport(&cause)))
+        }
     }
 }
 
-/// The library tells the end of the stream as "no error of the system".
 fn transport(cause: &std::io::Error) -> Error {
     use std::io::ErrorKind;
     match cause.kind() {
-        _ if cause.raw_os_error() == Some(0) => Error::Closed,
         ErrorKind::InvalidData | ErrorKind::InvalidInput if cause.raw_os_error().is_none() => {
             Error::Malformed(cause.to_string())
         }

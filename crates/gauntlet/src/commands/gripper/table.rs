@@ -110,7 +110,7 @@ pub fn json<B: Bench<X>, const X: usize>(
             json!({
                 "name": name,
                 "position": status.position[axis],
-                "asked": status.echo[axis],
+                "asked": status.going_to.then_some(status.echo[axis]),
                 "current_ma": u32::from(status.current[axis]) * 10,
                 "state": axis_words(status, axis),
             })
