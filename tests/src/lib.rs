@@ -1,5 +1,6 @@
 //! What the whole-loop tests in `tests/` and the long campaigns (`src/bin/campaign.rs`, started by `cargo xtask`) share.
 
+pub mod bench;
 pub mod bits;
 pub mod chip;
 pub mod emulated;

@@ -3,17 +3,17 @@
 //!
 //! The tests run a part of each campaign; `cargo xtask campaign` runs the whole ones (the ignored tests).
 
-use bridge::{App, Config, Instant, Platform, State, WeightsStore};
+use bridge::{App, Config, Instant, Platform, State};
 use gauntlet::slots::MemorySlot;
 use glove::scan::Scanner;
 use gripper::driver::{self, ThreeFinger};
 use gripper::{Activation, Duration, timing};
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
+use loop_tests::bench::{self, BAUD, Devices};
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
 
-const BAUD: u32 = 115_200;
 const MS: u64 = 1_000;
 /// The heartbeat of the clutch.
 const HEARTBEAT: u64 = 100 * MS;
@@ -95,24 +95,19 @@ struct Bench {
 impl Bench {
     /// A loop that follows the hand; the gripper was activated before.
     fn following(image: &[u8], config: driver::Config, hand: fn(f64) -> [f32; 25]) -> Self {
-        let clock = Clock::new();
-        let glove = VirtualGlove::new(Box::new(hand), rig::glove::Config::at_baud(BAUD));
-        let gripper = VirtualGripper::new(rig::gripper::Config::default());
+        let Devices {
+            clock,
+            glove,
+            glove_wire,
+            gripper,
+            gripper_wire: wire,
+        } = Devices::new(hand);
         gripper.preset_active();
-        let glove_wire = MemoryWire::new(&clock, glove.clone(), BAUD);
-        let wire = MemoryWire::new(&clock, gripper.clone(), BAUD);
-        let mut store = WeightsStore::new(
-            [MemorySlot::new(), MemorySlot::new()],
-            bridge::app::expected(4),
-        );
-        store.begin(image.len()).expect("room");
-        store.chunk(0, image).expect("bytes");
-        store.commit().expect("a sound image");
         let app = App::new(
             Machine(clock.clone()),
             Scanner::new(glove_wire, glove::scan::Config::default()),
             ThreeFinger::new(wire.clone(), config),
-            store,
+            bench::store(image),
             Config::default(),
         );
         let mut bench = Self {

@@ -1,7 +1,7 @@
 //! From a shown hand to a standing gripper, through every byte: the tool's training, the weights store, the virtual
 //! sensors behind the serial bridge, the map, the supervisor, Modbus, the virtual gripper's own fingers.
 
-use bridge::{App, Config, Instant, Platform, State, WeightsStore};
+use bridge::{App, Config, Instant, Platform, State};
 use gauntlet::interrupt::Interrupt;
 use gauntlet::poses::Motion;
 use gauntlet::slots::MemorySlot;
@@ -9,6 +9,7 @@ use gauntlet::training::{Request, train};
 use glove::hand::LIMITS;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
+use loop_tests::bench::{self, Devices};
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
@@ -16,7 +17,6 @@ use trainer::algorithm::Schedule;
 use trainer::motion::Generator;
 
 const SEED: u64 = 1;
-const BAUD: u32 = 115_200;
 /// The heartbeat of the clutch, microseconds.
 const HEARTBEAT: u64 = 100_000;
 /// Long enough for the slowest way through: blend, filter, and a full stroke.
@@ -50,23 +50,18 @@ struct Bench {
 
 impl Bench {
     fn new(image: &[u8], pose: [f32; 25]) -> Self {
-        let clock = Clock::new();
-        let glove = VirtualGlove::new(Box::new(move |_| pose), rig::glove::Config::at_baud(BAUD));
-        let gripper = VirtualGripper::new(rig::gripper::Config::default());
-        let glove_wire = MemoryWire::new(&clock, glove.clone(), BAUD);
-        let gripper_wire = MemoryWire::new(&clock, gripper.clone(), BAUD);
-        let mut store = WeightsStore::new(
-            [MemorySlot::new(), MemorySlot::new()],
-            bridge::app::expected(4),
-        );
-        store.begin(image.len()).expect("room");
-        store.chunk(0, image).expect("bytes");
-        store.commit().expect("a sound image");
+        let Devices {
+            clock,
+            glove,
+            glove_wire,
+            gripper,
+            gripper_wire,
+        } = Devices::new(move |_| pose);
         let app = App::new(
             Machine(clock.clone()),
             Scanner::new(glove_wire, glove::scan::Config::default()),
             ThreeFinger::new(gripper_wire, gripper::driver::Config::default()),
-            store,
+            bench::store(image),
             Config::default(),
         );
         Self {

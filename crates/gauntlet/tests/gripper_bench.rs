@@ -5,12 +5,12 @@ mod support;
 
 use std::process::Output;
 
-use std::process::{Child, Stdio};
+use std::process::Child;
 use std::time::{Duration, Instant};
 
 use rig::gripper::{Config, Family, VirtualGripper, tcp};
 use support::devices::gripper;
-use support::{command, finish, interrupt, json, refusal, run, text};
+use support::{finish, interrupt, json, refusal, run, start, text};
 
 fn bench(verb: &[&str], path: &str) -> Output {
     run(&[&["gripper"], verb, &["--gripper", path]].concat())
@@ -152,17 +152,22 @@ fn moving(more: &[&str]) -> (VirtualGripper, rig::pty::Handle, Child) {
         more,
     ]
     .concat();
-    let child = command(&arguments)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let child = start(&arguments);
     let end = Instant::now() + Duration::from_secs(30);
     while gripper.positions()[0] < 60.0 {
         assert!(Instant::now() < end, "it never moved");
         std::thread::sleep(Duration::from_millis(2));
     }
     (gripper, handle, child)
+}
+
+fn until_it_moves(gripper: &VirtualGripper, handle: &rig::pty::Handle) {
+    let end = Instant::now() + Duration::from_secs(30);
+    while gripper.motions() == 0 {
+        assert!(Instant::now() < end, "it never moved");
+        gripper.run_until(handle.clock().now());
+        std::thread::sleep(Duration::from_millis(2));
+    }
 }
 
 /// Where the axes are when nothing has moved for a while.
@@ -252,17 +257,8 @@ fn ctrl_c_with_a_gripper_that_is_gone_does_not_claim_a_hold() {
 #[test]
 fn ctrl_c_during_an_activation_says_that_it_goes_on() {
     let (gripper, handle, path) = gripper(Config::default());
-    let child = command(&["gripper", "activate", "--gripper", &path])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let end = Instant::now() + Duration::from_secs(30);
-    while gripper.motions() == 0 {
-        assert!(Instant::now() < end, "it never moved");
-        gripper.run_until(handle.clock().now());
-        std::thread::sleep(Duration::from_millis(2));
-    }
+    let child = start(&["gripper", "activate", "--gripper", &path]);
+    until_it_moves(&gripper, &handle);
     interrupt(&child);
     let output = finish(child);
     assert!(refusal(&output, 1).contains("goes on by itself"));
@@ -398,11 +394,7 @@ fn ctrl_c_ends_every_verb_while_nobody_answers() {
     for verb in verbs {
         let (gripper, _handle, path) = gripper(Config::default());
         gripper.mute(u32::MAX);
-        let child = command(&[&["gripper"], verb, &["--gripper", &path]].concat())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let child = start(&[&["gripper"], verb, &["--gripper", &path]].concat());
         let end = Instant::now() + Duration::from_secs(30);
         while gripper.requests().0 == 0 {
             assert!(Instant::now() < end, "it never asked");
@@ -423,11 +415,7 @@ fn ctrl_c_ends_every_verb_while_nobody_answers() {
 #[test]
 fn ctrl_c_ends_a_watch_which_has_done_its_work() {
     let (_gripper, _handle, path) = gripper(Config::default());
-    let mut child = command(&["gripper", "watch", "--gripper", &path])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = start(&["gripper", "watch", "--gripper", &path]);
     let said = support::until_line(child.stdout.take().unwrap(), "not activated");
     interrupt(&child);
     assert_eq!(
@@ -445,17 +433,8 @@ fn ctrl_c_during_a_mode_change_or_a_release_says_that_it_goes_on() {
         gripper.preset_active();
         // Something to open from.
         gripper.set_position(0, 200.0);
-        let child = command(&[&["gripper"], verb, &["--gripper", &path]].concat())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let end = Instant::now() + Duration::from_secs(30);
-        while gripper.motions() == 0 {
-            assert!(Instant::now() < end, "it never moved");
-            gripper.run_until(handle.clock().now());
-            std::thread::sleep(Duration::from_millis(1));
-        }
+        let child = start(&[&["gripper"], verb, &["--gripper", &path]].concat());
+        until_it_moves(&gripper, &handle);
         interrupt(&child);
         assert!(refusal(&finish(child), 1).contains("goes on by itself"));
     }
@@ -467,11 +446,7 @@ fn watch_names_the_layer_that_fails_on_the_network_as_words_and_as_json() {
         let gripper = VirtualGripper::new(Config::default());
         let server = tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();
         let place = format!("tcp:{}", server.address());
-        let mut child = command(&[&["gripper", "watch", "--gripper", &place], more].concat())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let mut child = start(&[&["gripper", "watch", "--gripper", &place], more].concat());
         let said = support::until_line(child.stdout.take().unwrap(), "not activated");
         drop(server);
         std::thread::sleep(Duration::from_millis(1_500));

@@ -3,10 +3,8 @@
 
 mod support;
 
-use std::process::Stdio;
-
 use support::{
-    Simulation, command, finish, interrupt, json, model, refusal, run, text, until_line, wait,
+    Simulation, finish, interrupt, json, model, refusal, run, start, text, until_line, wait,
 };
 
 fn bench(verb: &[&str], place: &str) -> std::process::Output {
@@ -107,11 +105,7 @@ fn teleop_drives_a_gripper_on_the_network_with_a_glove_on_a_serial_port() {
 fn ctrl_c_holds_a_gripper_on_the_network() {
     let mut simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &[]);
     let arguments = teleop(&simulation, &[]);
-    let mut child = command(&words(&arguments))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = start(&words(&arguments));
     let said = until_line(child.stdout.take().unwrap(), "following");
     interrupt(&child);
     assert_eq!(wait(&mut child).code(), Some(0));
@@ -124,11 +118,7 @@ fn ctrl_c_holds_a_gripper_on_the_network() {
 fn a_gripper_that_leaves_the_network_while_it_is_driven_is_told() {
     let simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &[]);
     let arguments = teleop(&simulation, &[]);
-    let mut child = command(&words(&arguments))
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = start(&words(&arguments));
     let said = until_line(child.stdout.take().unwrap(), "following");
     drop(simulation);
     std::thread::sleep(std::time::Duration::from_millis(300));
@@ -146,11 +136,7 @@ fn a_gripper_that_leaves_the_network_while_it_is_driven_is_told() {
 fn watch_on_the_network_shows_changes_until_its_time_is_over() {
     let mut simulation = Simulation::with(false, Some("tcp:127.0.0.1:0"), &[]);
     let place = simulation.gripper_place();
-    let watch = command(&["gripper", "watch", "--seconds", "4", "--gripper", &place])
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let watch = start(&["gripper", "watch", "--seconds", "4", "--gripper", &place]);
     json(&bench(&["activate", "--json"], &place));
     let output = finish(watch);
     let said = text(&output.stdout);

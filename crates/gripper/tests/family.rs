@@ -48,6 +48,15 @@ fn three_on_two(family: Family, active: bool) -> Three {
     }
 }
 
+/// Somewhere, slowly.
+fn somewhere<const X: usize>() -> Option<Motion<X>> {
+    Some(Motion {
+        position: [99; X],
+        speed: [1; X],
+        force: [1; X],
+    })
+}
+
 /// What is asked of a driver that has the wrong gripper.
 type Order<D> = fn(&mut D, gripper::Instant);
 
@@ -73,12 +82,7 @@ fn a_two_finger_driver_writes_nothing_to_a_three_finger_gripper_whatever_it_is_a
     type Driver = TwoFinger<rig::MemoryWire>;
     let orders: [(&str, Order<Driver>); 5] = [
         ("a motion", |driver, now| {
-            let motion = Motion {
-                position: [200],
-                speed: [255],
-                force: [255],
-            };
-            driver.set_motion(Some(motion), now);
+            driver.set_motion(somewhere(), now);
         }),
         ("an activation", |driver, _| driver.activate()),
         ("a reset", |driver, _| driver.reset()),
@@ -113,12 +117,7 @@ fn a_three_finger_driver_writes_nothing_to_the_others_and_says_what_they_are() {
     type Driver = ThreeFinger<rig::MemoryWire>;
     let orders: [Order<Driver>; 3] = [
         |driver, now| {
-            let motion = Motion {
-                position: [200; 4],
-                speed: [255; 4],
-                force: [255; 4],
-            };
-            driver.set_motion(Some(motion), now);
+            driver.set_motion(somewhere(), now);
         },
         |driver, _| driver.reset(),
         |driver, _| driver.automatic_release(),
@@ -170,12 +169,7 @@ fn written(
     let mut slave = slave;
     let mut last = None;
     while line.now() < 3_000_000 {
-        let motion = Motion {
-            position: [99],
-            speed: [1],
-            force: [1],
-        };
-        gripper.set_motion(Some(motion), at(line.now()));
+        gripper.set_motion(somewhere(), at(line.now()));
         let heard = run_gripper(
             &line,
             &mut gripper,
@@ -256,12 +250,7 @@ fn another_gripper_in_the_place_of_the_first_is_found_out() {
     (second.status[0], second.status[1]) = (0x31, 0);
     let mut last = None;
     while line.now() < 6_000_000 {
-        let motion = Motion {
-            position: [99],
-            speed: [1],
-            force: [1],
-        };
-        gripper.set_motion(Some(motion), at(line.now()));
+        gripper.set_motion(somewhere(), at(line.now()));
         let heard = run_gripper(
             &line,
             &mut gripper,
@@ -313,12 +302,7 @@ fn one_of_the_others_that_answers_eight_registers_is_found_out_once_it_is_ready(
     let mut slave = Slave::two_finger();
     let mut told = 0;
     for _ in 0..50 {
-        let motion = Motion {
-            position: [99; 4],
-            speed: [1; 4],
-            force: [1; 4],
-        };
-        gripper.set_motion(Some(motion), at(line.now()));
+        gripper.set_motion(somewhere(), at(line.now()));
         let heard = run_gripper(
             &line,
             &mut gripper,

@@ -20,14 +20,18 @@ pub fn command(arguments: &[&str]) -> Command {
     command
 }
 
-/// Runs to the end.
-pub fn run(arguments: &[&str]) -> Output {
-    let child = command(arguments)
+/// Starts it; what it says is kept.
+pub fn start(arguments: &[&str]) -> Child {
+    command(arguments)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
-    finish(child)
+        .unwrap()
+}
+
+/// Runs to the end.
+pub fn run(arguments: &[&str]) -> Output {
+    finish(start(arguments))
 }
 
 /// Collects what a child says until it ends.

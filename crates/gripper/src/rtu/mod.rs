@@ -240,12 +240,15 @@ struct Writer<'b> {
 }
 
 impl<'b> Writer<'b> {
-    fn new(out: &'b mut [u8], needed: usize) -> Result<Self, Error> {
+    /// A PDU of `needed` bytes that begins with this function code.
+    fn new(out: &'b mut [u8], needed: usize, function: u8) -> Result<Self, Error> {
         let given = out.len();
         if given < needed {
             return Err(Error::Buffer { needed, given });
         }
-        Ok(Self { out, at: 0 })
+        let mut writer = Self { out, at: 0 };
+        writer.put(&[function]);
+        Ok(writer)
     }
 
     fn put(&mut self, bytes: &[u8]) {
@@ -257,6 +260,18 @@ impl<'b> Writer<'b> {
 
     fn put_u16(&mut self, value: u16) {
         self.put(&value.to_be_bytes());
+    }
+
+    /// A register and a second word: its value, or how many.
+    fn put_pair(&mut self, address: u16, second: u16) {
+        self.put_u16(address);
+        self.put_u16(second);
+    }
+
+    /// A byte count and the bytes.
+    fn put_counted(&mut self, values: Registers<'_>) {
+        self.put(&[(2 * values.quantity()) as u8]);
+        self.put(values.bytes());
     }
 }
 
@@ -290,6 +305,20 @@ fn u16_at(bytes: &[u8], at: usize) -> Result<u16, Error> {
             found: bytes.len(),
         }),
     }
+}
+
+/// The function code that a PDU begins with.
+fn code_of(pdu: &[u8]) -> Result<u8, Error> {
+    pdu.first().copied().ok_or(Error::Short {
+        needed: 1,
+        found: 0,
+    })
+}
+
+/// The two words of a PDU that has nothing else behind its function code.
+fn pair_of(pdu: &[u8]) -> Result<(u16, u16), Error> {
+    exact(pdu, 5)?;
+    Ok((u16_at(pdu, 1)?, u16_at(pdu, 3)?))
 }
 
 fn exact(bytes: &[u8], expected: usize) -> Result<(), Error> {

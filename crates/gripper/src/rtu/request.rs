@@ -1,8 +1,8 @@
 //! Requests: what a master sends.
 
 use super::{
-    Error, Frame, MAX_READ, MAX_READ_WRITE, MAX_WRITE, Registers, Writer, emit_frame, exact,
-    function, quantity, u16_at,
+    Error, Frame, MAX_READ, MAX_READ_WRITE, MAX_WRITE, Registers, Writer, code_of, emit_frame,
+    exact, function, pair_of, quantity, u16_at,
 };
 
 /// One request. Register values are borrowed as the bytes that lie in the frame.
@@ -108,20 +108,23 @@ impl<'a> Request<'a> {
     pub fn emit_pdu(&self, out: &mut [u8]) -> Result<usize, Error> {
         self.check()?;
         let length = self.pdu_len();
-        let mut writer = Writer::new(out, length)?;
-        writer.put(&[self.function()]);
+        let mut writer = Writer::new(out, length, self.function())?;
         match *self {
-            Self::ReadHolding { address, quantity } | Self::ReadInput { address, quantity } => {
-                writer.put_u16(address);
-                writer.put_u16(quantity);
+            Self::ReadHolding {
+                address,
+                quantity: second,
             }
-            Self::WriteSingle { address, value } => {
-                writer.put_u16(address);
-                writer.put_u16(value);
+            | Self::ReadInput {
+                address,
+                quantity: second,
             }
+            | Self::WriteSingle {
+                address,
+                value: second,
+            } => writer.put_pair(address, second),
             Self::WriteMultiple { address, values } => {
-                writer.put_u16(address);
-                put_values(&mut writer, values);
+                writer.put_pair(address, values.quantity());
+                writer.put_counted(values);
             }
             Self::ReadWrite {
                 read_address,
@@ -129,10 +132,9 @@ impl<'a> Request<'a> {
                 write_address,
                 values,
             } => {
-                writer.put_u16(read_address);
-                writer.put_u16(read_quantity);
-                writer.put_u16(write_address);
-                put_values(&mut writer, values);
+                writer.put_pair(read_address, read_quantity);
+                writer.put_pair(write_address, values.quantity());
+                writer.put_counted(values);
             }
         }
         Ok(length)
@@ -152,14 +154,10 @@ impl<'a> Request<'a> {
     /// # Errors
     /// [`Error::Function`], `Short`, `Long`, `Quantity` or `ByteCount`.
     pub fn parse_pdu(pdu: &'a [u8]) -> Result<Self, Error> {
-        let &code = pdu.first().ok_or(Error::Short {
-            needed: 1,
-            found: 0,
-        })?;
+        let code = code_of(pdu)?;
         let request = match code {
             function::READ_HOLDING | function::READ_INPUT | function::WRITE_SINGLE => {
-                exact(pdu, 5)?;
-                let (address, second) = (u16_at(pdu, 1)?, u16_at(pdu, 3)?);
+                let (address, second) = pair_of(pdu)?;
                 match code {
                     function::READ_HOLDING => Self::ReadHolding {
                         address,
@@ -227,12 +225,6 @@ impl<'a> Request<'a> {
             }
         }
     }
-}
-
-fn put_values(writer: &mut Writer<'_>, values: Registers<'_>) {
-    writer.put_u16(values.quantity());
-    writer.put(&[(2 * values.quantity()) as u8]);
-    writer.put(values.bytes());
 }
 
 /// Quantity, byte count and values at `at`, to the end of the PDU.

@@ -1,8 +1,8 @@
 //! Replies: what a slave sends.
 
 use super::{
-    Error, Frame, MAX_READ, MAX_WRITE, Registers, Writer, emit_frame, exact, function, quantity,
-    u16_at,
+    Error, Frame, MAX_READ, MAX_WRITE, Registers, Writer, code_of, emit_frame, exact, function,
+    pair_of, quantity,
 };
 
 /// A Modbus exception code: the slave understood the frame and says no.
@@ -127,12 +127,10 @@ impl<'a> Response<'a> {
     pub fn emit_pdu(&self, out: &mut [u8]) -> Result<usize, Error> {
         self.check()?;
         let length = self.pdu_len();
-        let mut writer = Writer::new(out, length)?;
-        writer.put(&[self.function()]);
+        let mut writer = Writer::new(out, length, self.function())?;
         match *self {
             Self::ReadHolding(values) | Self::ReadInput(values) | Self::ReadWrite(values) => {
-                writer.put(&[(2 * values.quantity()) as u8]);
-                writer.put(values.bytes());
+                writer.put_counted(values);
             }
             Self::WriteSingle {
                 address,
@@ -141,10 +139,7 @@ impl<'a> Response<'a> {
             | Self::WriteMultiple {
                 address,
                 quantity: second,
-            } => {
-                writer.put_u16(address);
-                writer.put_u16(second);
-            }
+            } => writer.put_pair(address, second),
             Self::Exception { code, .. } => writer.put(&[code.0]),
         }
         Ok(length)
@@ -164,17 +159,13 @@ impl<'a> Response<'a> {
     /// # Errors
     /// [`Error::Function`], `Short`, `Long`, `Quantity` or `ByteCount`.
     pub fn parse_pdu(pdu: &'a [u8]) -> Result<Self, Error> {
-        let &code = pdu.first().ok_or(Error::Short {
-            needed: 1,
-            found: 0,
-        })?;
+        let code = code_of(pdu)?;
         let response = match code {
             function::READ_HOLDING => Self::ReadHolding(read_values(pdu)?),
             function::READ_INPUT => Self::ReadInput(read_values(pdu)?),
             function::READ_WRITE => Self::ReadWrite(read_values(pdu)?),
             function::WRITE_SINGLE | function::WRITE_MULTIPLE => {
-                exact(pdu, 5)?;
-                let (address, second) = (u16_at(pdu, 1)?, u16_at(pdu, 3)?);
+                let (address, second) = pair_of(pdu)?;
                 if code == function::WRITE_SINGLE {
                     Self::WriteSingle {
                         address,

@@ -1,0 +1,53 @@
+//! A glove and a gripper on byte-timed wires and one virtual clock, and a weights store that holds a map.
+
+use bridge::WeightsStore;
+use gauntlet::slots::MemorySlot;
+use rig::glove::VirtualGlove;
+use rig::gripper::VirtualGripper;
+use rig::{Clock, MemoryWire};
+
+/// Both wires' speed.
+pub const BAUD: u32 = 115_200;
+
+/// The virtual devices and the bridge's ends of their wires.
+pub struct Devices {
+    /// The time of all of them.
+    pub clock: Clock,
+    /// The glove.
+    pub glove: VirtualGlove,
+    /// The glove's wire.
+    pub glove_wire: MemoryWire,
+    /// The gripper, just powered on.
+    pub gripper: VirtualGripper,
+    /// The gripper's wire.
+    pub gripper_wire: MemoryWire,
+}
+
+impl Devices {
+    /// A hand that holds `pose` at each time, and an open gripper.
+    pub fn new(pose: impl Fn(f64) -> [f32; 25] + Send + 'static) -> Self {
+        let clock = Clock::new();
+        let glove = VirtualGlove::new(Box::new(pose), rig::glove::Config::at_baud(BAUD));
+        let gripper = VirtualGripper::new(rig::gripper::Config::default());
+        Self {
+            glove_wire: MemoryWire::new(&clock, glove.clone(), BAUD),
+            gripper_wire: MemoryWire::new(&clock, gripper.clone(), BAUD),
+            clock,
+            glove,
+            gripper,
+        }
+    }
+}
+
+/// A store that holds `image`, a sound one for four axes.
+///
+/// # Panics
+/// Where the store does not take it.
+pub fn store(image: &[u8]) -> WeightsStore<MemorySlot> {
+    let slots = [MemorySlot::new(), MemorySlot::new()];
+    let mut store = WeightsStore::new(slots, bridge::app::expected(4));
+    store.begin(image.len()).expect("room");
+    store.chunk(0, image).expect("bytes");
+    store.commit().expect("a sound image");
+    store
+}
