@@ -9,6 +9,8 @@ use gripper::driver::{Config, Error, ThreeFinger, TwoFinger};
 use gripper::registers::{Kind, two_finger::Model};
 use gripper::rtu::{Request, function};
 use gripper::{Activation, Gripper, Motion};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use rig::gripper::{Config as Virtual, Family};
 use support::{Line, Slave, at, run_gripper};
 
@@ -215,6 +217,67 @@ fn a_lost_reply_is_no_evidence() {
         );
         assert_eq!(writes, 0, "{lost} lost");
         assert_eq!(error, Some(Error::OtherGripper(Kind::ThreeFinger)));
+    }
+}
+
+#[test]
+fn on_a_line_that_loses_every_fifth_reply_no_three_finger_gripper_is_taken_for_another() {
+    const CONNECTIONS: u32 = 2_000;
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let mut writes = 0;
+    for _ in 0..CONNECTIONS {
+        let mut slave = Slave::three_finger();
+        (slave.status[0], slave.status[1]) = (0x31, 0);
+        let (written, error) = written(
+            |slave, request| {
+                let lost = rng.next_u64() % 5 == 0 || asked(request).0 == function::READ_INPUT;
+                (!lost).then(|| slave.answer(request))
+            },
+            slave,
+        );
+        writes += written;
+        assert!(
+            matches!(
+                error,
+                Some(Error::OtherGripper(Kind::ThreeFinger) | Error::Link(_))
+            ),
+            "{error:?}"
+        );
+    }
+    println!(
+        "{CONNECTIONS} connections of a 2-Finger driver to a 3-Finger gripper, every fifth reply lost: {writes} writes"
+    );
+    assert_eq!(writes, 0);
+}
+
+#[test]
+fn while_the_family_is_asked_for_every_wait_ends() {
+    // Nobody answers; or only what every family has is answered.
+    for answers in [false, true] {
+        let line = Line::default();
+        let mut gripper = TwoFinger::new(line.clone(), Model::HandE, Config::default());
+        let mut slave = Slave::two_finger();
+        gripper.identify();
+        let mut longest = 0;
+        while line.now() < 10_000_000 {
+            let began = line.now();
+            let heard = run_gripper(
+                &line,
+                &mut gripper,
+                began + 2_000_000,
+                &mut |line, end, request| {
+                    if answers && asked(request) == (function::READ_HOLDING, 3) {
+                        slave.serve(line, end, request);
+                    }
+                },
+            );
+            assert!(heard.is_some(), "a wait that does not end");
+            longest = longest.max(line.now() - began);
+        }
+        // Nobody there: asked a few times a second. Else: two reads that stay unanswered and are not told.
+        println!("answers: {answers}, the longest wait for an outcome {longest} µs");
+        assert!(longest < if answers { 100_000 } else { 1_100_000 });
+        assert_eq!(gripper.is_identified(), answers);
     }
 }
 

@@ -188,6 +188,61 @@ fn rtu_replies_are_the_manuals() {
     );
 }
 
+/// Every line of the shared list, so that none is forgotten above.
+#[test]
+fn every_line_of_the_golden_list_is_parsed_and_produced_again() {
+    let path = std::path::Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../../shared/data/robotiq/golden_frames.txt");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        println!("skipped: {} is absent", path.display());
+        return;
+    };
+    let (mut requests, mut replies, mut pdus, mut misprinted) = (0, 0, 0, 0);
+    for line in text.lines().filter(|line| !line.starts_with('#')) {
+        let (head, _) = line.split_once(';').expect("a meaning");
+        let mut words = head.splitn(3, ' ');
+        let (tag, way) = (words.next().unwrap(), words.next().unwrap());
+        let bytes = words.next().unwrap();
+        let frame = hex(bytes);
+        let mut out = [0; 64];
+        let (length, count) = match (tag, way) {
+            ("RTU" | "RTU2F" | "RTUD", "req") => {
+                let (unit, request) = Request::parse(&frame).expect(line);
+                (request.emit(unit, &mut out), &mut requests)
+            }
+            ("RTU" | "RTU2F" | "RTUD", "rsp") => {
+                let (unit, response) = Response::parse(&frame).expect(line);
+                (response.emit(unit, &mut out), &mut replies)
+            }
+            ("TCP", way) => {
+                let pdu = tcp_pdu(bytes).expect(line);
+                let length = if way == "req" {
+                    Request::parse_pdu(&pdu).expect(line).emit_pdu(&mut out)
+                } else {
+                    Response::parse_pdu(&pdu).expect(line).emit_pdu(&mut out)
+                };
+                assert_eq!(&out[..length.unwrap()], &pdu[..], "{line}");
+                pdus += 1;
+                continue;
+            }
+            ("TCPX", "rsp") => {
+                assert_eq!(tcp_pdu(bytes), None);
+                misprinted += 1;
+                continue;
+            }
+            _ => panic!("a line of no known kind: {line}"),
+        };
+        assert_eq!(&out[..length.unwrap()], &frame[..], "{line}");
+        *count += 1;
+    }
+    println!(
+        "golden list: {requests} RTU requests, {replies} RTU replies, {pdus} TCP PDUs parsed and produced again; {misprinted} misprinted one refused"
+    );
+    let lines = text.lines().filter(|line| !line.starts_with('#')).count();
+    assert_eq!(requests + replies + pdus + misprinted, lines);
+    assert_eq!(misprinted, 1);
+}
+
 /// The PDU of a Modbus TCP frame whose length field is right.
 fn tcp_pdu(text: &str) -> Option<Vec<u8>> {
     let bytes = hex(text);

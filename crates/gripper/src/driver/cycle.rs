@@ -88,7 +88,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
         self.misses = 0;
         let doing = doing?;
-        if !wide && doing.quantity < F::WHOLE {
+        if F::PROBES.is_empty() && doing.quantity < F::WHOLE {
             // A sign of life, not a status.
             let stale = self.link.counters().stale;
             kind = self.identity.short_answer(doing.quantity, stale);
@@ -141,7 +141,6 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
     }
 
     fn note_failure(&mut self, error: link::Error) {
-        let known = self.identity.known;
         match error {
             link::Error::Timeout { .. } => {
                 self.misses = self.misses.saturating_add(1);
@@ -157,7 +156,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
         // Somebody may have put another gripper there.
         let away = matches!(error, link::Error::Port(_)) || self.misses >= timing::PATIENCE;
-        if known && away && self.config.check_family {
+        if away && self.config.check_family {
             self.identity.forget();
         }
     }

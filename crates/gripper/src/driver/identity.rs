@@ -11,7 +11,7 @@ use crate::rtu::{Exception, function};
 
 /// Reads of more registers than the family has that must go unanswered before an answer to FC04
 /// proves it, and before answers to FC03 do.
-const SILENT: (u8, u8) = (2, 3);
+const SILENT: (u8, u8) = (2, 6);
 /// Unanswered reads with FC04 after which a gripper whose eight registers say nothing counts as a
 /// 3-Finger one; short reads alone that are answered before it counts as none.
 const PERSISTENT: u8 = 3;
@@ -22,6 +22,9 @@ pub(super) struct Identity {
     /// Somebody wants to know, written or not.
     pub(super) asked: bool,
     pub(super) known: bool,
+    /// It has answered as a gripper of another family. Only answers that say something else count
+    /// after that, or its absence.
+    foreign: bool,
     /// The next probe.
     pub(super) step: usize,
     /// Wide reads without an answer; reads with FC03 answered after one.
@@ -60,14 +63,17 @@ impl Identity {
             .zip(values)
             .for_each(|(byte, value)| *byte = *value);
         match Kind::of_status(&block) {
-            Some(Kind::ThreeFinger) => {
-                self.forget();
-                return Err(Kind::ThreeFinger);
-            }
+            Some(Kind::ThreeFinger) => return Err(self.is_foreign()),
             Some(Kind::TwoFinger) => self.known = true,
             None => self.zeros = true,
         }
         Ok(())
+    }
+
+    fn is_foreign(&mut self) -> Kind {
+        self.forget();
+        self.foreign = true;
+        Kind::ThreeFinger
     }
 
     pub(super) fn wide_silence(&mut self) {
@@ -89,7 +95,7 @@ impl Identity {
         let (with_input, with_holding) = SILENT;
         if code == function::READ_INPUT {
             self.known |= self.zeros || self.silent >= with_input;
-        } else if self.silent > self.near {
+        } else if self.silent > self.near && !self.foreign {
             self.near += 1;
             self.known |= self.near >= with_holding;
         }
@@ -99,8 +105,7 @@ impl Identity {
     pub(super) fn input_silence(&mut self) -> Result<(), Kind> {
         self.unheard = self.unheard.saturating_add(1);
         if self.zeros && self.unheard >= PERSISTENT {
-            self.forget();
-            return Err(Kind::ThreeFinger);
+            return Err(self.is_foreign());
         }
         Ok(())
     }
