@@ -11,7 +11,7 @@ struct Target {
     corpus: &'static str,
 }
 
-const TARGETS: [Target; 3] = [
+const TARGETS: [Target; 4] = [
     Target {
         name: "gripper_frames",
         corpus: "crates/gripper/tests/corpus/frames",
@@ -23,6 +23,10 @@ const TARGETS: [Target; 3] = [
     Target {
         name: "gripper_driver",
         corpus: "crates/gripper/tests/corpus/driver",
+    },
+    Target {
+        name: "gripper_family",
+        corpus: "crates/gripper/tests/corpus/family",
     },
 ];
 

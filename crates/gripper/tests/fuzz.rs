@@ -81,6 +81,22 @@ fn the_link_holds_its_rules_under_any_operations() {
 }
 
 #[test]
+fn a_driver_writes_nothing_to_another_family_under_any_operations() {
+    let mut rng = ChaCha8Rng::seed_from_u64(14);
+    let (mut requests, mut writes) = (0, 0);
+    for data in corpus("family") {
+        fuzz::family(&data);
+    }
+    for _ in 0..3_000 {
+        let seen = fuzz::family(&random(&mut rng, 600));
+        requests += seen.0;
+        writes += seen.1;
+    }
+    println!("{requests} requests, {writes} writes, all of them to its own family");
+    assert!(requests > 10_000 && writes > 3_000);
+}
+
+#[test]
 fn the_driver_holds_its_rules_under_any_operations() {
     let mut rng = ChaCha8Rng::seed_from_u64(13);
     let (mut requests, mut writes) = (0, 0);

@@ -2,10 +2,11 @@
 //! `tests/fuzz.rs` on stable; a coverage-guided fuzzer may call the same functions.
 
 use super::{Line, Slave, at};
-use gripper::driver::{Config, Control, ThreeFinger};
+use gripper::driver::{Config, Control, ThreeFinger, TwoFinger};
 use gripper::link::{self, Debt, Link};
 use gripper::registers::STATUS;
 use gripper::registers::three_finger::Mode;
+use gripper::registers::two_finger::Model;
 use gripper::rtu::{Frame, Registers, Request, Response};
 use gripper::{Gripper, Motion, timing};
 
@@ -304,4 +305,85 @@ fn check_written(
         );
         assert_eq!(block[3], motion.position[0]);
     }
+}
+
+/// A 2-Finger driver under a list of operations, on a gripper of its own family or on a 3-Finger one,
+/// which answers at least every other long read. It writes nothing to the latter, and to the former
+/// nothing it was not told to. Returns requests served, and writes to a gripper of its own.
+pub fn family(data: &[u8]) -> (u32, u32) {
+    let mut script = Script(data);
+    let line = Line::default();
+    let mut driver = TwoFinger::new(line.clone(), Model::TwoFinger85, Config::default());
+    let foreign = script.byte().is_multiple_of(2);
+    let mut slave = if foreign {
+        let mut slave = Slave::three_finger();
+        // At rest, following nothing: in three registers it looks like one of the others.
+        (slave.status[0], slave.status[1]) = (0x31, 0);
+        slave
+    } else {
+        Slave::two_finger()
+    };
+    let (mut told, mut requests, mut dropped) = (false, 0, false);
+    while !script.0.is_empty() {
+        match script.byte() % 8 {
+            0 => {
+                let asked = Motion {
+                    position: [script.byte()],
+                    speed: [1],
+                    force: [1],
+                };
+                driver.set_motion(Some(asked), at(line.now()));
+                told = true;
+            }
+            1 => match script.byte() % 8 {
+                0 => driver.activate(),
+                1 => driver.reset(),
+                2 => driver.automatic_release(),
+                3 => driver.identify(),
+                _ => driver.set_motion(None, at(line.now())),
+            },
+            2 => {
+                let count = usize::from(script.byte() % 32);
+                let noise = script.bytes(count);
+                line.send(line.now(), u64::from(script.byte()), &noise);
+            }
+            3 => line.set_now(line.now() + 100 * u64::from(script.byte())),
+            _ => {
+                let end = line.now() + 20_000;
+                while line.now() < end {
+                    let _ = driver.poll(at(line.now()));
+                    told |= driver.task().is_some();
+                    for (sent, bytes) in line.take_written() {
+                        requests += 1;
+                        let (_, request) = Request::parse(&bytes).unwrap();
+                        let quantity = (request.reply_len() - 5) / 2;
+                        let mut lost = script.byte().is_multiple_of(8);
+                        if quantity > 3 {
+                            lost &= !dropped;
+                            dropped = lost;
+                        }
+                        // The 3-Finger gripper has no FC04, the others no fourth register.
+                        let unknown = match foreign {
+                            true => matches!(request, Request::ReadInput { .. }),
+                            false => quantity > 3,
+                        };
+                        if !lost && !unknown {
+                            let end = sent + bytes.len() as u64 * super::CHARACTER;
+                            slave.serve(&line, end, &bytes);
+                        }
+                        assert!(
+                            slave.writes == 0 || told && !foreign,
+                            "written to a gripper of another family, or untold"
+                        );
+                    }
+                    let due = driver.next_due().as_ticks().max(line.now() + 1);
+                    line.set_now(
+                        line.next_byte()
+                            .map_or(due, |byte| byte.clamp(line.now() + 1, due)),
+                    );
+                }
+            }
+        }
+    }
+    (requests, slave.writes)
 }

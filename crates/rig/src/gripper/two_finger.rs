@@ -122,9 +122,11 @@ impl TwoFinger {
     /// The status block: 6 bytes, the rest 0.
     pub fn status(&self) -> [u8; 16] {
         let sta: u8 = match self.state {
-            State::Reset => 0,
+            // The manual: reset, or automatic release.
+            State::Reset | State::Releasing => 0,
+            State::Failed if self.fault == fault::RELEASED => 0,
             State::Closing | State::Opening | State::Reactivating { .. } => 1,
-            State::Ready | State::Releasing | State::Failed => 3,
+            State::Ready | State::Failed => 3,
         };
         let object = if self.going {
             self.axis.detection as u8
