@@ -3,7 +3,7 @@
 use bridge::WeightsStore;
 use gauntlet::slots::MemorySlot;
 use rig::glove::VirtualGlove;
-use rig::gripper::VirtualGripper;
+use rig::gripper::{Family, VirtualGripper};
 use rig::{Clock, MemoryWire};
 
 /// Both wires' speed.
@@ -26,9 +26,14 @@ pub struct Devices {
 impl Devices {
     /// A hand that holds `pose` at each time, and an open gripper.
     pub fn new(pose: impl Fn(f64) -> [f32; 25] + Send + 'static) -> Self {
+        Self::with(pose, Family::ThreeFinger)
+    }
+
+    /// The same with a gripper of this family.
+    pub fn with(pose: impl Fn(f64) -> [f32; 25] + Send + 'static, family: Family) -> Self {
         let clock = Clock::new();
         let glove = VirtualGlove::new(Box::new(pose), rig::glove::Config::at_baud(BAUD));
-        let gripper = VirtualGripper::new(rig::gripper::Config::default());
+        let gripper = VirtualGripper::new(rig::gripper::Config::of(family));
         Self {
             glove_wire: MemoryWire::new(&clock, glove.clone(), BAUD),
             gripper_wire: MemoryWire::new(&clock, gripper.clone(), BAUD),
@@ -44,10 +49,15 @@ impl Devices {
 /// # Panics
 /// Where the store does not take it.
 pub fn store(image: &[u8]) -> WeightsStore<MemorySlot> {
-    let slots = [MemorySlot::new(), MemorySlot::new()];
-    let mut store = WeightsStore::new(slots, bridge::app::expected(4));
+    let mut store = empty_store(4);
     store.begin(image.len()).expect("room");
     store.chunk(0, image).expect("bytes");
     store.commit().expect("a sound image");
     store
+}
+
+/// A store without an image, for a gripper with this many axes.
+pub fn empty_store(axes: usize) -> WeightsStore<MemorySlot> {
+    let slots = [MemorySlot::new(), MemorySlot::new()];
+    WeightsStore::new(slots, bridge::app::expected(axes))
 }

@@ -339,8 +339,10 @@ fn another_gripper_in_the_place_of_the_first_is_found_out() {
 
 #[test]
 fn the_check_can_be_turned_off() {
-    let mut config = Config::default();
-    config.check_family = false;
+    let config = Config {
+        check_family: false,
+        ..Config::default()
+    };
     let (clock, wire, truth) = wire(Virtual::default());
     truth.preset_active();
     let driver = TwoFinger::new(wire.clone(), Model::TwoFinger85, config);

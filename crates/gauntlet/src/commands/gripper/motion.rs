@@ -232,10 +232,10 @@ impl<const X: usize> Limited<X> {
 
     /// `accepted`: the gripper repeats this command; before that its contacts speak of an earlier one.
     fn note(&mut self, status: &Status<X>, command: &[u8; X], accepted: bool) {
-        for axis in 0..X {
+        for (axis, told) in command.iter().enumerate() {
             let here = status.position[axis];
             let short = status.contact[axis] == Contact::AtPosition
-                && here != command[axis]
+                && here != *told
                 && here == self.position[axis];
             self.calm[axis] = match accepted && short {
                 true => self.calm[axis].saturating_add(1),

@@ -1,0 +1,130 @@
+//! The same loop with a gripper of one axis: the map's number of outputs follows the gripper's axes.
+
+use bridge::{App, Config, Instant, Platform, State};
+use glove::scan::Scanner;
+use gripper::Gripper;
+use gripper::driver::TwoFinger;
+use gripper::registers::two_finger::Model;
+use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
+use loop_tests::bench::{Devices, empty_store};
+use rig::Clock;
+use rig::gripper::Family;
+
+/// The index finger's proximal flexion.
+const JOINT: usize = 5;
+/// The heartbeat of the clutch, microseconds.
+const HEARTBEAT: u64 = 100_000;
+
+struct Machine(Clock);
+
+impl Platform for Machine {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        let soonest = Instant::from_ticks(self.0.now().as_ticks() + 1);
+        self.0.wait_until(due.max(soonest));
+    }
+}
+
+/// A map with `outputs` outputs, each of which closes with the index finger.
+fn image(outputs: usize) -> Vec<u8> {
+    const HIDDEN: usize = bridge::HIDDEN;
+    let (mut w1, b1) = (vec![0.0; HIDDEN * 25], vec![0.0; HIDDEN]);
+    w1[JOINT] = 1.0;
+    let (mut w2, b2) = (vec![0.0; outputs * HIDDEN], vec![0.0; outputs]);
+    w2.iter_mut()
+        .step_by(HIDDEN)
+        .for_each(|weight| *weight = 255.0);
+    let parameters = Parameters {
+        inputs: 25,
+        hidden: HIDDEN,
+        outputs,
+        w1: &w1,
+        b1: &b1,
+        w2: &w2,
+        b2: &b2,
+    };
+    let meta = Meta {
+        model_id: 1,
+        version: 1,
+        joint_order: JointOrder::Hand25,
+    };
+    let mut bytes = vec![0; encoded_len(25, HIDDEN, outputs)];
+    encode(&parameters, &meta, &mut bytes).expect("a sound image");
+    bytes
+}
+
+fn hand(closed: f32) -> [f32; 25] {
+    core::array::from_fn(|joint| if joint == JOINT { closed } else { 0.0 })
+}
+
+#[test]
+fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
+    for (model, family) in [
+        (Model::TwoFinger85, Family::TwoFinger85),
+        (Model::TwoFinger140, Family::TwoFinger140),
+        (Model::HandE, Family::HandE),
+    ] {
+        let Devices {
+            clock,
+            glove,
+            glove_wire,
+            gripper,
+            gripper_wire,
+        } = Devices::with(|_| hand(0.1), family);
+        gripper.preset_active();
+        let mut store = empty_store(1);
+        let image = image(1);
+        store.begin(image.len()).expect("room");
+        store.chunk(0, &image).expect("bytes");
+        store.commit().expect("an image of one output");
+        let mut app: App<_, _, _, _, 1> = App::new(
+            Machine(clock.clone()),
+            Scanner::new(glove_wire, glove::scan::Config::default()),
+            TwoFinger::new(gripper_wire, model, gripper::driver::Config::default()),
+            store,
+            Config::default(),
+        );
+        let mut beat = 0;
+        let mut run = |seconds: u64| {
+            let end = clock.now().as_ticks() + seconds * 1_000_000;
+            while clock.now().as_ticks() < end {
+                let now = clock.now().as_ticks();
+                if now >= beat {
+                    app.engage();
+                    beat = now + HEARTBEAT;
+                }
+                let due = app.step();
+                app.platform_mut()
+                    .wait_until(due.min(Instant::from_ticks(end)));
+            }
+            let state = app.telemetry().state;
+            (state, gripper.positions()[0], app.gripper_mut().counters())
+        };
+        let (state, open, _) = run(5);
+        assert_eq!(state, State::Following, "{family:?}");
+        assert!((open - 25.5).abs() < 3.0, "{family:?} {open}");
+        glove.set_pose(Box::new(|time_s: f64| {
+            hand((0.1 + (time_s - 5.0).clamp(0.0, 1.0) * 0.6) as f32)
+        }));
+        let (state, closed, counters) = run(5);
+        println!("{family:?}: {open:.0} to {closed:.0} counts; {counters:?}");
+        assert_eq!(state, State::Following, "{family:?}");
+        assert!((closed - 178.5).abs() < 3.0, "{family:?} {closed}");
+        // The two reads that told its family.
+        assert_eq!(counters.timeouts, 2);
+    }
+}
+
+#[test]
+fn an_image_of_another_number_of_outputs_is_refused() {
+    for (axes, outputs) in [(1, 4), (4, 1)] {
+        let mut store = empty_store(axes);
+        let image = image(outputs);
+        let begun = store.begin(image.len());
+        let taken = begun.is_ok() && store.chunk(0, &image).is_ok() && store.commit().is_ok();
+        assert!(!taken, "{outputs} outputs for {axes} axes");
+    }
+}
