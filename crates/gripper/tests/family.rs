@@ -288,13 +288,15 @@ fn the_others_are_let_through_however_they_say_that_they_have_three_registers() 
         reply.extend(gripper::rtu::crc16(&reply).to_le_bytes());
         reply
     };
-    // By an exception; by zeros; by silence, without FC04.
-    for way in 0..3 {
+    // By an exception; by zeros; by silence, without FC04; by exceptions of which the first is lost.
+    for way in 0..4 {
+        let mut first = true;
         let (writes, _) = written(
             |slave, request| {
                 let (code, quantity) = asked(request);
                 match way {
-                    0 if quantity > 3 => Some(refused(request)),
+                    3 if quantity > 3 && std::mem::take(&mut first) => None,
+                    0 | 3 if quantity > 3 => Some(refused(request)),
                     2 if quantity > 3 || code == function::READ_INPUT => None,
                     _ => Some(slave.answer(request)),
                 }

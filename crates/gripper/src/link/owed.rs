@@ -116,12 +116,14 @@ impl Owed {
 
     /// The request that a late exception at the front of `bytes` refuses: the oldest unanswered one of
     /// its function. An exception does not say which request it answers; a slave answers in order, so
-    /// while one of that function is owed it is not the answer to a younger one.
+    /// while one of that function is owed it is not the answer to a younger one, and once a younger
+    /// request has been answered it is not that to an older one.
     pub(super) fn late_exception(&self, bytes: &[u8]) -> Option<Signature> {
         let frame = Frame::new_checked(bytes.get(..EXCEPTION_FRAME)?).ok()?;
         let refuses = |entry: &&Entry| {
             let [unit, code, _] = entry.signature.head;
-            unit == frame.unit() && code | function::EXCEPTION == frame.function()
+            let same = unit == frame.unit() && code | function::EXCEPTION == frame.function();
+            same && !entry.settled
         };
         let oldest = self.0.iter().filter(refuses).min_by_key(|entry| entry.sent);
         oldest.map(|entry| entry.signature)
