@@ -337,6 +337,22 @@ fn poses_that_do_not_fit_are_refused() {
 }
 
 #[test]
+fn poses_beyond_what_a_map_takes_as_input_are_refused() {
+    let network = Network::random(14, [3, 7, 2]);
+    let mut out = vec![0; 500];
+    let mut encode =
+        |poses: &[f32]| quantized::encode(&network.parameters(), poses, &meta(3), &mut out);
+    let edge = hae::INPUT_LIMIT;
+    assert_eq!(encode(&[edge, -edge, 0.0]), Ok(448));
+    for value in [edge.next_up(), -edge.next_up(), 180.0] {
+        let refused = encode(&[0.0, 0.0, 0.0, 0.0, value, 0.0]);
+        assert_eq!(refused, Err(Error::PoseRange { at: 4, value }));
+        let words = refused.unwrap_err().to_string();
+        assert!(words.contains(&format!("value 4 of the calibration poses is {value}")));
+    }
+}
+
+#[test]
 fn errors_are_those_of_the_bytes_that_were_checked() {
     let network = Network::random(17, [3, 7, 2]);
     let (image, other) = (quantise(&network, &poses(18, 3, 5)), network.image());

@@ -122,6 +122,13 @@ pub enum Error {
         /// The length needed.
         needed: usize,
     },
+    /// A calibration pose has an angle beyond ±2π, which a map refuses as an input.
+    PoseRange {
+        /// Index of the value, counted through all poses.
+        at: usize,
+        /// The value, radians.
+        value: f32,
+    },
 }
 
 impl fmt::Display for Error {
@@ -241,6 +248,12 @@ impl fmt::Display for Error {
                 write!(
                     f,
                     "a buffer of {found} elements is too small, {needed} are needed"
+                )
+            }
+            Self::PoseRange { at, value } => {
+                write!(
+                    f,
+                    "value {at} of the calibration poses is {value}, beyond ±2π: poses are in radians, one value for each input"
                 )
             }
         }

@@ -24,8 +24,9 @@ pub const fn encoded_len(inputs: usize, hidden: usize, outputs: usize) -> usize 
 ///
 /// # Errors
 /// As [`image::encode`](crate::image::encode); [`Error::ParameterLength`] if `poses` is not whole poses,
-/// [`Error::NotFinite`] with `poses`' index if one is not finite. [`Error::Overflow`] also for parameters whose
-/// magnitudes differ so much that the scales leave the range of f32.
+/// [`Error::NotFinite`] with `poses`' index if one is not finite, [`Error::PoseRange`] if one lies beyond ±2π: a map refuses
+/// it as an input, so no range may come of it. [`Error::Overflow`] also for parameters whose magnitudes differ so much that
+/// the scales leave the range of f32.
 pub fn encode(
     p: &Parameters<'_>,
     poses: &[f32],
@@ -43,6 +44,10 @@ pub fn encode(
     }
     if let Some(at) = poses.iter().position(|q| !q.is_finite()) {
         return Err(Error::NotFinite { at });
+    }
+    let mut values = poses.iter().enumerate();
+    if let Some((at, &value)) = values.find(|(_, q)| q.abs() > INPUT_LIMIT) {
+        return Err(Error::PoseRange { at, value });
     }
     let length = encoded_len(p.inputs, p.hidden, p.outputs);
     let found = out.len();
