@@ -6,15 +6,8 @@
 use hae::Map;
 use hae::image::Checked;
 
-unsafe extern "C" {
-    fn a_panic_is_reachable() -> !;
-}
-
-#[panic_handler]
-fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    // SAFETY: never linked.
-    unsafe { a_panic_is_reachable() }
-}
+#[path = "../never_panics.rs"]
+mod never_panics;
 
 /// The linker's start: an image that was checked before, either kind, at `bytes`; true if there are outputs in `y`.
 ///
