@@ -35,16 +35,7 @@ fn the_loop_follows_the_hand_by_a_map_in_16_bit_integers() {
     assert_eq!(element(&bench), Element::I16);
     bench.ready();
     bench.follow();
-    bench.run(3 * S);
-    let open = bench.gripper.positions();
-    assert!(open[..3].iter().all(|finger| *finger <= 30.0), "{open:?}");
-    bench.set_pose(FIST);
-    bench.run(4 * S);
-    let closed = bench.gripper.positions();
-    assert!(
-        closed[..3].iter().all(|finger| *finger >= 225.0),
-        "{closed:?}"
-    );
+    bench.expect_open_then_closed();
 }
 
 #[test]

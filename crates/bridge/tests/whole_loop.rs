@@ -30,16 +30,7 @@ fn closing() -> Bench {
 #[test]
 fn an_open_hand_opens_the_gripper_and_a_fist_closes_it() {
     let mut bench = following();
-    bench.run(3 * S);
-    let open = bench.gripper.positions();
-    assert!(open[..3].iter().all(|finger| *finger <= 30.0), "{open:?}");
-    bench.set_pose(FIST);
-    bench.run(4 * S);
-    let closed = bench.gripper.positions();
-    assert!(
-        closed[..3].iter().all(|finger| *finger >= 225.0),
-        "{closed:?}"
-    );
+    bench.expect_open_then_closed();
     bench.set_pose([0.0; 25]);
     bench.run(4 * S);
     let open = bench.gripper.positions();

@@ -230,6 +230,8 @@ where
         if output.before.is_moving() && !output.state.is_moving() {
             match output.state {
                 State::Faulted(_) => bump(&mut counters.faults),
+                // The person let go: nothing went wrong.
+                State::Idle => {}
                 _ => bump(&mut counters.holds),
             }
         }

@@ -1,6 +1,6 @@
 //! The whole loop on rig's virtual devices and clock: glove bytes in, gripper bytes out.
 
-use super::{Flash, hand_image};
+use super::{FIST, Flash, hand_image};
 use bridge::app::expected;
 use bridge::event::{Event, Kind};
 use bridge::{App, Config, Instant, Platform, Settings, State, WeightsStore};
@@ -161,6 +161,20 @@ impl Bench {
     pub fn follow(&mut self) {
         self.clutch = true;
         self.until("following", |bench| bench.state() == State::Following);
+    }
+
+    /// Follows a hand that stays open, then one that becomes a fist.
+    pub fn expect_open_then_closed(&mut self) {
+        self.run(3 * S);
+        let open = self.gripper.positions();
+        assert!(open[..3].iter().all(|finger| *finger <= 30.0), "{open:?}");
+        self.set_pose(FIST);
+        self.run(4 * S);
+        let closed = self.gripper.positions();
+        assert!(
+            closed[..3].iter().all(|finger| *finger >= 225.0),
+            "{closed:?}"
+        );
     }
 
     pub fn release(&mut self) {
