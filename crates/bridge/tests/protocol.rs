@@ -5,11 +5,12 @@ mod common;
 
 use bridge::protocol::message::{
     Answer, CHUNK, Call, Counters, FromBridge, Refusal, Reply, Request, SlotContents, VERSION,
+    WeightsKind,
 };
 use bridge::protocol::{Outcome, Server, frame};
 use bridge::{Settings, State, store};
 use common::bench::{Bench, MS, S};
-use common::hand_image;
+use common::{hand_image, hand_image_int16};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 use std::cell::RefCell;
 use std::collections::VecDeque;
@@ -235,13 +236,13 @@ fn following() -> Host {
 fn hello_and_status_have_the_bytes_that_the_protocol_document_prints() {
     let mut host = without_weights();
     host.say(&[0x08, 0x07, 0x01, 0x00]); // noise, then a zero ends it
-    host.say(&framed(&[0x07, 0x01, 0x00, 0x01]));
+    host.say(&framed(&[0x07, 0x01, 0x00, 0x02]));
     let reply = host.reply();
     assert_eq!((reply.session, reply.sequence), (7, 1));
     let Ok(Answer::Hello(hello)) = reply.answer else {
         panic!("{reply:?}")
     };
-    assert_eq!(hello.version, 1);
+    assert_eq!(hello.version, 2);
     assert_eq!(hello.shape, [25, 300, 4]);
     assert_eq!(hello.joint_order, 1);
     host.say(&framed(&[0x07, 0x02, 0x01]));
@@ -252,8 +253,8 @@ fn hello_and_status_have_the_bytes_that_the_protocol_document_prints() {
 fn another_version_and_requests_before_hello_are_refused() {
     let mut host = without_weights();
     assert_eq!(host.ask(Call::Status), Err(Refusal::NoSession));
-    let answer = host.ask(Call::Hello { version: 2 });
-    assert_eq!(answer, Err(Refusal::Version { bridge: 1 }));
+    let answer = host.ask(Call::Hello { version: 1 });
+    assert_eq!(answer, Err(Refusal::Version { bridge: 2 }));
     assert_eq!(host.ask(Call::Engage), Err(Refusal::NoSession));
     assert!(!host.bench.app.is_engaged());
 }
@@ -286,20 +287,24 @@ fn an_image_flashed_over_the_line_is_the_map_and_reads_back_by_its_crc() {
 }
 
 #[test]
-fn both_slots_are_told_each_with_the_crc_of_its_own_image() {
+fn both_slots_are_told_each_with_the_crc_and_the_kind_of_its_own_image() {
     let mut host = without_weights().hello();
-    let images = [hand_image(1), hand_image(2)];
+    let images = [hand_image(1), hand_image_int16(2)];
     for image in &images {
         assert!(host.flash(image).is_ok());
     }
     let Ok(Answer::Slots(slots)) = host.ask(Call::Slots) else {
         panic!()
     };
-    let crcs = slots.contents.map(|contents| match contents {
-        SlotContents::Image { crc, .. } => crc,
+    let told = slots.contents.map(|contents| match contents {
+        SlotContents::Image { crc, weights, .. } => (crc, weights),
         other => panic!("{other:?}"),
     });
-    assert_eq!(crcs, [crc32(&images[0]), crc32(&images[1])]);
+    let kinds = [WeightsKind::Float32, WeightsKind::Int16];
+    assert_eq!(
+        told,
+        [(crc32(&images[0]), kinds[0]), (crc32(&images[1]), kinds[1])]
+    );
 }
 
 #[test]
@@ -369,6 +374,35 @@ fn the_clutch_opens_when_its_heartbeat_stops() {
         "{:?}",
         host.bench.state()
     );
+}
+
+#[test]
+fn the_hold_that_a_vanished_host_leaves_is_told_and_ends_by_a_release() {
+    let mut host = following();
+    let clutch = |host: &mut Host| match host.ask(Call::Status) {
+        Ok(Answer::Status(status)) => (status.engaged, status.heartbeat),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(clutch(&mut host), (true, true));
+    host.run(5 * S);
+    let mut host = host.hello();
+    assert_eq!(clutch(&mut host), (true, false));
+    let held = host.bench.gripper.positions();
+    assert_eq!(
+        host.ask(Call::ConfigurationGet).map(|_| ()),
+        Ok(()),
+        "asking is free"
+    );
+    assert_eq!(host.ask(Call::Activate), Err(Refusal::Engaged));
+    assert!(host.ask(Call::Release).is_ok());
+    host.run(100 * MS);
+    assert_eq!(clutch(&mut host), (false, false));
+    assert!(matches!(host.flash(&hand_image(2)), Ok(Answer::Slots(_))));
+    let moved = held
+        .iter()
+        .zip(host.bench.gripper.positions())
+        .any(|(held, now)| (held - now).abs() > 1.0);
+    assert!(!moved, "a release moves nothing");
 }
 
 #[test]
@@ -475,7 +509,7 @@ fn garbage_between_requests_is_counted_and_the_next_request_is_answered() {
 
 #[test]
 fn every_single_bit_error_in_a_request_is_refused_by_the_frame() {
-    let frame = framed(&[0x07, 0x01, 0x00, 0x01]);
+    let frame = framed(&[0x07, 0x01, 0x00, 0x02]);
     for bit in 0..frame.len() * 8 {
         let mut host = without_weights();
         let mut damaged = frame.clone();

@@ -15,6 +15,8 @@ pub trait Controls<const X: usize> {
 
     /// See [`App::is_engaged`].
     fn is_engaged(&self) -> bool;
+    /// See [`App::heartbeat_comes`].
+    fn heartbeat_comes(&self) -> bool;
     /// See [`App::engage`].
     fn engage(&mut self);
     /// See [`App::release`].
@@ -49,6 +51,10 @@ where
 
     fn is_engaged(&self) -> bool {
         self.is_engaged()
+    }
+
+    fn heartbeat_comes(&self) -> bool {
+        self.heartbeat_comes()
     }
 
     fn engage(&mut self) {

@@ -227,6 +227,18 @@ where
         self.heartbeat.is_some() || self.supervisor.state() != State::Idle
     }
 
+    /// Whether the clutch's heartbeat comes. Where it stopped, the gripper is held, and [`App::is_engaged`] stays true until
+    /// somebody releases.
+    pub fn heartbeat_comes(&self) -> bool {
+        self.heartbeat.is_some_and(|beat| {
+            self.telemetry
+                .now
+                .checked_duration_since(beat)
+                // One from after the newest step has just come.
+                .is_none_or(|age| age < timing::HEARTBEAT_TIMEOUT)
+        })
+    }
+
     /// What is known after the newest step.
     pub fn telemetry(&self) -> &Telemetry<X> {
         &self.telemetry

@@ -7,11 +7,12 @@ use crate::config::SafeAction;
 use crate::{State, filter, store};
 use glove::hand::{JOINT_COUNT, Side};
 use gripper::{Activation, registers::Fault};
+use hae::image::Element;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Most bytes of a weights chunk: with its frame, less than half of a port's receive queue of 2,048 bytes.
 pub const CHUNK: usize = 512;
 /// Most axes of a gripper.
@@ -155,8 +156,10 @@ pub struct Status {
     pub now_us: u64,
     /// The supervisor's state.
     pub state: State,
-    /// Whether the clutch is closed.
+    /// Whether the clutch is closed, or a hold under it has not been released.
     pub engaged: bool,
+    /// Whether the clutch's heartbeat comes. Engaged without it: the host that closed the clutch is gone, the gripper held.
+    pub heartbeat: bool,
     /// Whether frames come from the glove.
     pub glove_answers: bool,
     /// The gripper, when it answers.
@@ -206,7 +209,30 @@ pub enum SlotContents {
         length: u32,
         /// CRC-32/ISO-HDLC of the whole image's bytes, computed from the flash for this answer.
         crc: u32,
+        /// How its weights are stored.
+        weights: WeightsKind,
     },
+}
+
+/// How an image stores its weights.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+pub enum WeightsKind {
+    /// As f32.
+    Float32,
+    /// As 16-bit integers.
+    Int16,
+    /// In a way that this version of the protocol has no word for.
+    Other,
+}
+
+impl From<Element> for WeightsKind {
+    fn from(element: Element) -> Self {
+        match element {
+            Element::F32 => Self::Float32,
+            Element::I16 => Self::Int16,
+            _ => Self::Other,
+        }
+    }
 }
 
 /// Counts since start.
@@ -244,6 +270,35 @@ pub struct Counters {
     pub bytes_lost: [u32; 3],
     /// Most bytes of stack that were ever in use; 0 where nobody looks.
     pub stack_used: u32,
+}
+
+impl Counters {
+    /// What was counted since `before`. The latest step, the lost bytes and the stack stay what they are since the start.
+    pub const fn since(&self, before: &Self) -> Self {
+        let [good, crc, coding, oversized] = self.host_frames;
+        let [good_before, crc_before, coding_before, oversized_before] = before.host_frames;
+        Self {
+            frames: self.frames.wrapping_sub(before.frames),
+            following_frames: self.following_frames.wrapping_sub(before.following_frames),
+            answered_frames: self.answered_frames.wrapping_sub(before.answered_frames),
+            unusable_frames: self.unusable_frames.wrapping_sub(before.unusable_frames),
+            commands: self.commands.wrapping_sub(before.commands),
+            statuses: self.statuses.wrapping_sub(before.statuses),
+            gripper_errors: self.gripper_errors.wrapping_sub(before.gripper_errors),
+            steps: self.steps.wrapping_sub(before.steps),
+            late_steps: self.late_steps.wrapping_sub(before.late_steps),
+            holds: self.holds.wrapping_sub(before.holds),
+            faults: self.faults.wrapping_sub(before.faults),
+            host_frames: [
+                good.wrapping_sub(good_before),
+                crc.wrapping_sub(crc_before),
+                coding.wrapping_sub(coding_before),
+                oversized.wrapping_sub(oversized_before),
+            ],
+            host_malformed: self.host_malformed.wrapping_sub(before.host_malformed),
+            ..*self
+        }
+    }
 }
 
 /// What is now.
@@ -342,3 +397,48 @@ pub const SETTING_NAMES: [&str; 8] = [
     "lead",
     "open_rate",
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::Counters;
+
+    #[test]
+    fn counters_since_are_what_was_added_and_the_extremes_stay() {
+        let before = Counters {
+            frames: u32::MAX,
+            holds: 3,
+            host_frames: [10, 1, 2, 3],
+            host_malformed: 4,
+            bytes_lost: [1, 2, 3],
+            worst_late_us: 500,
+            stack_used: 1_000,
+            ..Counters::default()
+        };
+        let after = Counters {
+            frames: 4,
+            following_frames: 3,
+            answered_frames: 2,
+            unusable_frames: 1,
+            commands: 9,
+            statuses: 8,
+            gripper_errors: 7,
+            steps: 6,
+            late_steps: 5,
+            holds: 5,
+            faults: 1,
+            host_frames: [15, 2, 4, 6],
+            host_malformed: 8,
+            bytes_lost: [1, 5, 3],
+            worst_late_us: 600,
+            stack_used: 1_200,
+        };
+        let since = Counters {
+            frames: 5,
+            holds: 2,
+            host_frames: [5, 1, 2, 3],
+            host_malformed: 4,
+            ..after
+        };
+        assert_eq!(after.since(&before), since);
+    }
+}

@@ -448,6 +448,7 @@ fn status<A: Controls<X>, const X: usize>(app: &A) -> Status {
         now_us: seen.now.as_ticks(),
         state: seen.state,
         engaged: app.is_engaged(),
+        heartbeat: app.heartbeat_comes(),
         glove_answers: seen.glove_answers,
         gripper: seen
             .status

@@ -94,6 +94,7 @@ impl Reading {
                     version: header.meta.version,
                     length: header.length as u32,
                     crc: self.digest.clone().finalize(),
+                    weights: header.element.into(),
                 }
             }
         };
