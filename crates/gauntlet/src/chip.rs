@@ -50,7 +50,9 @@ pub struct Summary {
     pub seconds: f64,
     /// Frames the bridge took from the glove.
     pub frames: u32,
-    /// Frames answered with a command that follows the hand.
+    /// Frames that the gripper was to follow.
+    pub following_frames: u32,
+    /// Of those, frames answered with a command that follows the hand.
     pub answered_frames: u32,
     /// Commands that left the bridge.
     pub commands: u32,
@@ -87,8 +89,8 @@ impl Summary {
                 self.gripper_cycles
             ),
             format!(
-                "answered   {} of {} glove frames got a gripper command that follows the hand",
-                self.answered_frames, self.frames
+                "answered   {} of {} glove frames that came while following got a gripper command",
+                self.answered_frames, self.following_frames
             ),
             format!(
                 "latency    oldest sample to command, of {} telemetry samples: p50 {}, p99 {}",
@@ -303,17 +305,18 @@ impl<'a> Watch<'a> {
     }
 
     fn summary(&self, seconds: f64, before: &Counters, after: &Counters) -> Summary {
-        let grown = |of: fn(&Counters) -> u32| of(after).wrapping_sub(of(before));
+        let grown = after.since(before);
         Summary {
             seconds,
-            frames: grown(|c| c.frames),
-            answered_frames: grown(|c| c.answered_frames),
-            commands: grown(|c| c.commands),
-            gripper_cycles: grown(|c| c.statuses),
-            gripper_errors: grown(|c| c.gripper_errors),
-            holds: grown(|c| c.holds),
-            faults: grown(|c| c.faults),
-            bytes_lost: after.bytes_lost,
+            frames: grown.frames,
+            following_frames: grown.following_frames,
+            answered_frames: grown.answered_frames,
+            commands: grown.commands,
+            gripper_cycles: grown.statuses,
+            gripper_errors: grown.gripper_errors,
+            holds: grown.holds,
+            faults: grown.faults,
+            bytes_lost: grown.bytes_lost,
             samples: self.samples,
             latency_p50_us: self.latency.at(0.5),
             latency_p99_us: self.latency.at(0.99),

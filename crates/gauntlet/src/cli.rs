@@ -268,6 +268,12 @@ pub enum BridgeVerb {
         #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
     },
+    /// Open the clutch: end the hold that a vanished host has left; the gripper stays where it is.
+    Release {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+    },
     /// Watch hand and gripper; the clutch is not touched.
     Monitor {
         /// Where it is.

@@ -35,6 +35,8 @@ pub struct Setup {
     pub glove: Option<PathBuf>,
     /// The serial device at UART 2; nothing when absent.
     pub gripper: Option<PathBuf>,
+    /// Whether a debugger may look in, at [`Emulator::debugger`].
+    pub debugger: bool,
 }
 
 /// An emulated bridge.
@@ -119,6 +121,11 @@ impl Emulator {
     /// The file that is the weights flash.
     pub fn flash_file(&self) -> PathBuf {
         self.folder.path().join("flash")
+    }
+
+    /// The socket of QEMU's debugger port, where the setup asks for one.
+    pub fn debugger(&self) -> PathBuf {
+        self.folder.path().join("debugger.sock")
     }
 
     /// Starts the machine, with the flash as it was left.
@@ -224,6 +231,11 @@ impl Emulator {
         let socket = with_path("socket,id=host,server=on,wait=off,path=", &socket);
         option("-chardev", socket);
         option("-serial", "chardev:host".into());
+        if self.setup.debugger {
+            let mut port = with_path("unix:", &self.debugger());
+            port.push(",server=on,wait=off");
+            option("-gdb", port);
+        }
         for (name, path) in [
             ("glove", &self.setup.glove),
             ("gripper", &self.setup.gripper),

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::protocol::message::Status;
 use gripper::Activation;
 use serde_json::json;
 
@@ -20,6 +21,8 @@ use crate::{out, words};
 /// An activation takes a few seconds; a gripper that needs longer has a fault.
 const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
 const PAUSE: Duration = Duration::from_millis(100);
+/// For the bridge to see that its clutch was opened.
+const RELEASE_WAIT: Duration = Duration::from_secs(2);
 
 /// Does what was asked.
 ///
@@ -33,6 +36,7 @@ pub(super) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
             activate,
             seconds,
         } => engage(at, *activate, *seconds, interrupt),
+        BridgeVerb::Release { at } => release(at),
         BridgeVerb::Monitor { at, seconds } => monitor(at, *seconds, interrupt),
         BridgeVerb::Log { at, out, seconds } => log(at, out, *seconds, interrupt),
         BridgeVerb::Select { slot, at } => select(at, *slot),
@@ -68,7 +72,7 @@ fn status(at: &BridgeAt) -> Result<()> {
     tell.say(format_args!(
         "state      {}, clutch {}",
         status.state,
-        if status.engaged { "closed" } else { "open" }
+        clutch_words(&status)
     ));
     for fault in standing_faults(&status) {
         tell.say(format_args!("fault      {fault}"));
@@ -87,8 +91,9 @@ fn status(at: &BridgeAt) -> Result<()> {
         tell.say(format_args!("transfer   {there} of {announced} bytes"));
     }
     tell.say(format_args!(
-        "counters   {} frames, {} answered; {} commands; {} gripper cycles, {} errors; bytes lost {:?} (host, glove, gripper)",
+        "counters   {} frames, {} to follow, {} of those answered; {} commands; {} gripper cycles, {} errors; bytes lost {:?} (host, glove, gripper)",
         counters.frames,
+        counters.following_frames,
         counters.answered_frames,
         counters.commands,
         counters.statuses,
@@ -101,6 +106,41 @@ fn status(at: &BridgeAt) -> Result<()> {
             counters.stack_used
         ));
     }
+    Ok(())
+}
+
+/// How the clutch is. A host that vanished leaves a hold, which keeps the bridge from other work until it is released.
+fn clutch_words(status: &Status) -> &'static str {
+    match (status.engaged, status.heartbeat) {
+        (false, _) => "open",
+        (true, true) => "closed",
+        (true, false) => "left by a host that vanished: `gauntlet bridge release` ends the hold",
+    }
+}
+
+fn release(at: &BridgeAt) -> Result<()> {
+    let mut link = connect(at)?;
+    link.release().map_err(Failure::from)?;
+    // The next step of the bridge, 10 ms later, takes it.
+    let end = Instant::now() + RELEASE_WAIT;
+    let mut status = link.status().map_err(Failure::from)?;
+    while status.engaged && Instant::now() < end {
+        status = link.status().map_err(Failure::from)?;
+    }
+    if status.engaged {
+        return Err(Failure::new(
+            format!("the bridge keeps its clutch closed: it is {}", status.state),
+            "the same again; `gauntlet bridge status` says what keeps it",
+        )
+        .into());
+    }
+    if at.json {
+        return out::json(&status);
+    }
+    Tell::new(false).say(format_args!(
+        "the clutch is open; the bridge is {}",
+        status.state
+    ));
     Ok(())
 }
 

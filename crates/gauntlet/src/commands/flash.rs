@@ -1,7 +1,7 @@
 //! `gauntlet flash`: weights into a bridge on a chip.
 
 use anyhow::Result;
-use bridge::protocol::message::{SlotContents, Slots};
+use bridge::protocol::message::{SlotContents, Slots, WeightsKind};
 use serde::Serialize;
 
 use crate::cli::Flash;
@@ -102,10 +102,47 @@ pub(super) fn slot_lines(slots: &Slots) -> Vec<String> {
                     version,
                     length,
                     crc,
+                    weights,
                 } => format!(
-                    "slot {slot}     model {model_id:08x} version {version}, {length} bytes, CRC {crc:08x}{mark}"
+                    "slot {slot}     model {model_id:08x} version {version} in {}, {length} bytes, CRC {crc:08x}{mark}",
+                    kind(*weights)
                 ),
             }
         })
         .collect()
+}
+
+const fn kind(weights: WeightsKind) -> &'static str {
+    match weights {
+        WeightsKind::Float32 => "f32",
+        WeightsKind::Int16 => "16-bit integers",
+        WeightsKind::Other => "numbers of a kind this tool does not know",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_slot_s_line_says_how_its_weights_are_stored() {
+        let image = |weights| SlotContents::Image {
+            model_id: 0xAB,
+            version: 3,
+            length: 600,
+            crc: 0x1234,
+            weights,
+        };
+        let lines = slot_lines(&Slots {
+            active: Some(1),
+            contents: [image(WeightsKind::Float32), image(WeightsKind::Int16)],
+        });
+        assert_eq!(
+            lines,
+            [
+                "slot 0     model 000000ab version 3 in f32, 600 bytes, CRC 00001234",
+                "slot 1     model 000000ab version 3 in 16-bit integers, 600 bytes, CRC 00001234 (active)",
+            ]
+        );
+    }
 }

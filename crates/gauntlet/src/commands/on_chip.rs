@@ -41,6 +41,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         firmware,
         glove: Some(devices[0].path().to_owned()),
         gripper: Some(devices[1].path().to_owned()),
+        debugger: false,
     })?;
     let outcome = demo::trained(options, &motion, &tell, interrupt)?;
     let image = model::image(&outcome.model)?;

@@ -54,6 +54,20 @@ pub enum Error {
         /// CRC of the image sent.
         expected: u32,
     },
+    /// The line broke again and again during one transfer.
+    #[error(
+        "the line broke {times} times, the last time with: {cause}; the bridge has {done} of {total} bytes, and its old weights"
+    )]
+    Breaking {
+        /// Times it broke.
+        times: u32,
+        /// Bytes the bridge has taken.
+        done: u32,
+        /// Bytes of the image.
+        total: u32,
+        /// What the last time was.
+        cause: Box<Error>,
+    },
     /// A person asked for the end while an image was being written.
     #[error("stopped after {done} of {total} bytes; the bridge still has its old weights")]
     Stopped {
@@ -133,6 +147,12 @@ impl From<Error> for Failure {
             Error::Silent { heard, .. } if heard.bytes > 0 => {
                 "that this is UART 0 of a bridge, 115200 baud at both ends, and that no other program speaks on this line".to_owned()
             }
+            Error::Silent {
+                address: Address::Unix(_) | Address::Tcp(_),
+                ..
+            } => {
+                "ending the other program that has this socket, which serves one at a time; else starting the emulator again".to_owned()
+            }
             Error::Silent { .. } => {
                 "the bridge's power, and that this is its UART 0".to_owned()
             }
@@ -140,6 +160,7 @@ impl From<Error> for Failure {
             Error::Confused(_) => "the same command again; the tool and the firmware of the same release".to_owned(),
             Error::TooLong => "the tool of the same release as the firmware".to_owned(),
             Error::ReadBack { .. } => "the same command again; if it stays so, the flash is worn out".to_owned(),
+            Error::Breaking { .. } => "another cable or socket; then the same command again: it goes on where it was, unless the bridge restarted".to_owned(),
             Error::Stopped { .. } => "the same command again: it goes on where it stopped, unless the bridge restarted".to_owned(),
         };
         Self::new(error.to_string(), next)
@@ -163,9 +184,9 @@ pub fn refusal_words(refusal: &Refusal) -> (String, String) {
             ),
             "ending the other program, then 2 s of patience".to_owned(),
         ),
-        Refusal::Engaged => (
+        Refusal::Engaged | Refusal::Store(bridge::store::Error::Engaged) => (
             "its clutch is closed".to_owned(),
-            "opening the clutch first: end the `gauntlet bridge engage` that keeps it closed"
+            "opening the clutch first: end the `gauntlet bridge engage` that keeps it closed, or, where its host is gone, `gauntlet bridge release`"
                 .to_owned(),
         ),
         Refusal::Store(error) => {

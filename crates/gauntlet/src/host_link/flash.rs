@@ -13,7 +13,7 @@ const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 /// A broken line is opened again for so long after the last byte that got through.
 const GIVE_UP: Duration = Duration::from_secs(10);
 /// A line that breaks more often in one transfer will not carry it.
-const MOST_BROKEN: u32 = 100;
+pub(super) const MOST_BROKEN: u32 = 100;
 /// Pause between two attempts to open it.
 const PAUSE: Duration = Duration::from_millis(250);
 
@@ -61,6 +61,17 @@ impl HostLink {
         interrupt: &Interrupt,
         progress: &mut dyn FnMut(u32),
     ) -> Result<Flashed, Error> {
+        self.flash_with(image, interrupt, progress, PAUSE)
+    }
+
+    /// [`HostLink::flash`] with `pause` between two attempts to open a broken line.
+    pub(super) fn flash_with(
+        &mut self,
+        image: &[u8],
+        interrupt: &Interrupt,
+        progress: &mut dyn FnMut(u32),
+        pause: Duration,
+    ) -> Result<Flashed, Error> {
         let mut transfer = Transfer {
             image,
             crc: CRC32.checksum(image),
@@ -74,13 +85,17 @@ impl HostLink {
         let slots = loop {
             match outcome {
                 Ok(slots) => break slots,
-                Err(error)
-                    if error.is_of_the_line()
-                        && transfer.grew.elapsed() < GIVE_UP
-                        && broken_lines < MOST_BROKEN =>
-                {
+                Err(error) if error.is_of_the_line() && broken_lines == MOST_BROKEN => {
+                    return Err(Error::Breaking {
+                        times: broken_lines + 1,
+                        done: transfer.there,
+                        total: transfer.total(),
+                        cause: Box::new(error),
+                    });
+                }
+                Err(error) if error.is_of_the_line() && transfer.grew.elapsed() < GIVE_UP => {
                     broken_lines += 1;
-                    if interrupt.sleep(PAUSE) {
+                    if interrupt.sleep(pause) {
                         return Err(transfer.stopped());
                     }
                     outcome = self

@@ -110,6 +110,7 @@ fn slots(crc: u32) -> Answer {
         version: 1,
         length: 600,
         crc,
+        weights: bridge::protocol::message::WeightsKind::Float32,
     };
     Answer::Slots(Slots {
         active: Some(1),
@@ -178,6 +179,13 @@ fn a_bridge_that_says_nothing_is_silent_after_five_requests() {
         "{result:?}"
     );
     assert_eq!(heard.len(), 5);
+    // An emulator's socket takes a second host and never answers it.
+    let failure = Failure::from(result.unwrap_err());
+    assert!(
+        failure.next_step().contains("the other program"),
+        "{}",
+        failure.next_step()
+    );
 }
 
 #[test]
@@ -223,6 +231,45 @@ fn a_flash_goes_on_over_a_new_line_where_the_bridge_says() {
 }
 
 #[test]
+fn a_line_that_breaks_a_hundred_times_and_once_more_is_given_up() {
+    let image = [7u8; 600];
+    let most = flash::MOST_BROKEN;
+    let breaks = |times: u32| {
+        let mut script = vec![hello(), received(0)];
+        for _ in 0..times {
+            // A chunk that is never answered: the far side hangs up.
+            script.extend([Do::HangUp, hello(), received(0)]);
+        }
+        script
+    };
+    let flash = |address: &Address| {
+        let never = Interrupt::never().unwrap();
+        HostLink::connect(address)?.flash_with(&image, &never, &mut |_| {}, Duration::ZERO)
+    };
+    let mut script = breaks(most);
+    script.push(Do::HangUp);
+    let (result, heard) = talk(script, flash);
+    let Err(error) = result else {
+        panic!("{result:?}")
+    };
+    assert!(
+        matches!(&error, Error::Breaking { times, done: 0, total: 600, .. } if *times == most + 1),
+        "{error:?}"
+    );
+    assert!(error.to_string().contains("the line broke 101 times"));
+    assert!(!Failure::from(error).next_step().is_empty());
+    let hellos = heard.iter().filter(|(_, name)| name == "Hello").count();
+    assert_eq!(hellos as u32, most + 1);
+
+    let crc = crc32(&image);
+    let mut script = breaks(most);
+    script.extend([received(512), received(600)]);
+    script.extend([Do::Answer(Ok(slots(crc))), Do::Answer(Ok(slots(crc)))]);
+    let (result, _) = talk(script, flash);
+    assert_eq!(result.map(|flashed| flashed.broken_lines), Ok(most));
+}
+
+#[test]
 fn another_image_in_the_flash_than_was_sent_is_an_error() {
     let script = vec![
         hello(),
@@ -249,7 +296,7 @@ fn a_refusal_is_told_in_one_line_with_its_next_step() {
     let failure = Failure::from(result.unwrap_err());
     assert_eq!(
         failure.to_string(),
-        "the bridge refuses: it speaks version 9 of the host protocol, this tool version 1"
+        "the bridge refuses: it speaks version 9 of the host protocol, this tool version 2"
     );
     assert!(!failure.next_step().is_empty());
 }
