@@ -4,6 +4,8 @@ use crate::elf::Program;
 use crate::figures::{self, Figures, Mode};
 use crate::step::{self, Failure};
 use crate::{surprises, thumb};
+use std::fs::DirBuilder;
+use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -120,33 +122,89 @@ pub fn require_emulator() -> Result<(), Failure> {
     ))
 }
 
-/// Starts the firmware in QEMU until it is interrupted.
-pub fn emulate() -> Result<(), Failure> {
+/// Starts the firmware in QEMU until it is interrupted. `options` may name serial devices for the two other ports:
+/// `--glove PORT`, `--gripper PORT`; a port without one is a socket.
+pub fn emulate(options: &[&str]) -> Result<(), Failure> {
+    let devices = devices(options)?;
     require_emulator()?;
     let elf = build()?;
     let folder = std::env::temp_dir().join(format!("gauntlet-qemu-{}", std::process::id()));
-    std::fs::create_dir(&folder).map_err(|error| format!("{}: {error}", folder.display()))?;
+    // Whoever reaches the host's socket can move the gripper: the folder is this user's alone.
+    DirBuilder::new()
+        .mode(0o700)
+        .create(&folder)
+        .map_err(|error| format!("{}: {error}", folder.display()))?;
     let at = |name: &str| folder.join(name).display().to_string();
-    println!("host protocol: unix:{}", at("host"));
-    println!("glove:         unix:{}", at("glove"));
-    println!("gripper:       unix:{}", at("gripper"));
+    let mut qemu = Command::new(EMULATOR);
+    qemu.args(["-display", "none", "-monitor", "none"])
+        .args(["-machine", "mps2-an386,memory-backend=flash"])
+        .arg("-object")
+        .arg(format!(
+            "memory-backend-file,id=flash,size=16M,mem-path={},share=on",
+            comma(&at("flash"))
+        ))
+        .arg("-kernel")
+        .arg(&elf);
+    let ports = [
+        ("host", "host protocol:", None),
+        ("glove", "glove:        ", devices[0]),
+        ("gripper", "gripper:      ", devices[1]),
+    ];
+    for (name, title, device) in ports {
+        let backend = match device {
+            Some(device) => {
+                println!("{title} {device}");
+                format!("serial,id={name},path={}", comma(device))
+            }
+            None => {
+                println!("{title} unix:{}", at(name));
+                let path = comma(&at(name));
+                format!("socket,id={name},path={path},server=on,wait=off")
+            }
+        };
+        qemu.args(["-chardev", &backend, "-serial", &format!("chardev:{name}")]);
+    }
     println!(
         "weights flash: {} (kept until you remove it); Ctrl-C ends",
         at("flash")
     );
-    let mut qemu = Command::new(EMULATOR);
-    qemu.args(["-display", "none", "-monitor", "none", "-machine"])
-        .arg("mps2-an386,memory-backend=flash")
-        .arg("-object")
-        .arg(format!(
-            "memory-backend-file,id=flash,size=16M,mem-path={},share=on",
-            at("flash")
-        ))
-        .arg("-kernel")
-        .arg(&elf);
-    for port in ["host", "glove", "gripper"] {
-        qemu.arg("-serial")
-            .arg(format!("unix:{},server=on,wait=off", at(port)));
-    }
     step::run("qemu", &mut qemu)
+}
+
+/// The glove's and the gripper's device.
+fn devices<'a>(options: &[&'a str]) -> Result<[Option<&'a str>; 2], Failure> {
+    let mut devices = [None; 2];
+    for pair in options.chunks(2) {
+        match pair {
+            ["--glove", port] => devices[0] = Some(*port),
+            ["--gripper", port] => devices[1] = Some(*port),
+            _ => {
+                return Err(format!(
+                    "{:?} is no option of qemu: --measure alone, or --glove PORT and --gripper PORT",
+                    pair.join(" ")
+                ));
+            }
+        }
+    }
+    Ok(devices)
+}
+
+/// A comma in a path is doubled, as QEMU's options want it.
+fn comma(path: &str) -> String {
+    path.replace(',', ",,")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::devices;
+
+    #[test]
+    fn the_ports_of_the_emulator_are_named_or_sockets() {
+        assert_eq!(devices(&[]), Ok([None, None]));
+        assert_eq!(
+            devices(&["--gripper", "/b", "--glove", "/a"]),
+            Ok([Some("/a"), Some("/b")])
+        );
+        assert!(devices(&["--glove"]).is_err() && devices(&["--host", "/a"]).is_err());
+    }
 }

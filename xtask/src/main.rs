@@ -24,7 +24,8 @@ chores:
   firmware            build the device crates (no_std) and the firmware for thumbv7em-none-eabihf; check that
                       the loop cannot panic, that there is no allocator, and that the program has not grown
   figures --record    write sizes and instruction counts down as those of the compiler in use
-  qemu                start the firmware in QEMU, its three ports as sockets in a private folder
+  qemu                start the firmware in QEMU, its ports as sockets in a private folder, or on the serial
+                      devices of [--glove PORT] [--gripper PORT]
   qemu --measure      the whole loop in QEMU for 60 s: rates and losses
   same-bits           the map and the whole bridge on the emulated chip and here, bit by bit
   powercut            power cuts in the weights store, any slot contents, QEMU killed while flashing
@@ -49,8 +50,8 @@ fn main() -> ExitCode {
             firmware::inspect(&elf, figures::Mode::Check)
         }),
         ["figures", "--record"] => firmware::record(),
-        ["qemu"] => firmware::emulate(),
         ["qemu", "--measure"] => firmware::run_campaign("measure"),
+        ["qemu", options @ ..] => firmware::emulate(options),
         ["same-bits"] => firmware::run_campaign("same-bits"),
         ["powercut"] => firmware::run_campaign("powercut"),
         ["bench", "map"] => bench::map(),
