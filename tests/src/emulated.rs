@@ -1,5 +1,7 @@
 //! The firmware in the emulator, in real time: the whole loop by its counters, and power cuts while weights are flashed.
 
+use std::io::Write;
+use std::os::unix::net::UnixStream;
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
@@ -7,7 +9,7 @@ use std::time::{Duration, Instant};
 use bridge::State;
 use bridge::protocol::message::{Answer, Call, Counters, SlotContents};
 use gauntlet::emulator::{Emulator, Setup};
-use gauntlet::host_link::{Error, HostLink};
+use gauntlet::host_link::{Address, Error, HostLink};
 use gauntlet::interrupt::Interrupt;
 use gauntlet::realtime;
 use gripper::Activation;
@@ -39,8 +41,41 @@ pub fn bare(firmware: &Path) -> Emulator {
         firmware: firmware.to_owned(),
         glove: None,
         gripper: None,
+        debugger: false,
     })
     .expect("an emulator")
+}
+
+/// [`bare`], into which a debugger may look.
+///
+/// # Panics
+/// As [`bare`].
+pub fn debugged(firmware: &Path) -> Emulator {
+    Emulator::new(Setup {
+        firmware: firmware.to_owned(),
+        glove: None,
+        gripper: None,
+        debugger: true,
+    })
+    .expect("an emulator")
+}
+
+/// Waits until the machine has started again: its time is less than `before_us`. A new line to it.
+///
+/// # Panics
+/// It does not within a minute.
+pub fn restarted(emulator: &mut Emulator, before_us: u64) -> HostLink {
+    let end = Instant::now() + PATIENCE;
+    loop {
+        assert!(emulator.is_on(), "the emulator ended");
+        // While it hangs it does not answer.
+        if let Ok(mut link) = emulator.link()
+            && link.status().is_ok_and(|status| status.now_us < before_us)
+        {
+            return link;
+        }
+        assert!(Instant::now() < end, "it did not start again");
+    }
 }
 
 /// Flashes `image`; the CRC that the bridge reads back.
@@ -107,7 +142,7 @@ pub struct Stretch {
     pub seconds: f64,
     /// How long by the bridge's own clock, seconds.
     pub bridge_seconds: f64,
-    /// The counters' growth; `bytes_lost` and `worst_late_us` since the start.
+    /// [`Counters::since`] the start of the stretch.
     pub grown: Counters,
     /// Every state seen was `Following`.
     pub followed_throughout: bool,
@@ -133,6 +168,7 @@ impl Loop {
             firmware: firmware.to_owned(),
             glove: Some(ports[0].path().to_owned()),
             gripper: Some(ports[1].path().to_owned()),
+            debugger: false,
         })
         .expect("an emulator");
         let mut link = emulator.link().expect("a bridge");
@@ -177,7 +213,7 @@ impl Loop {
         Stretch {
             seconds: started.elapsed().as_secs_f64(),
             bridge_seconds: clock(&mut self.link) - bridge_started,
-            grown: grown(&before, &after),
+            grown: after.since(&before),
             followed_throughout: half.iter().chain(&states).all(following)
                 && before.holds == after.holds,
             moved,
@@ -191,22 +227,31 @@ fn spawn(device: Box<dyn Device>) -> Handle {
     handle.expect("a terminal")
 }
 
-fn grown(before: &Counters, after: &Counters) -> Counters {
-    let of = |of: fn(&Counters) -> u32| of(after).wrapping_sub(of(before));
-    Counters {
-        frames: of(|c| c.frames),
-        following_frames: of(|c| c.following_frames),
-        answered_frames: of(|c| c.answered_frames),
-        unusable_frames: of(|c| c.unusable_frames),
-        commands: of(|c| c.commands),
-        statuses: of(|c| c.statuses),
-        gripper_errors: of(|c| c.gripper_errors),
-        steps: of(|c| c.steps),
-        late_steps: of(|c| c.late_steps),
-        holds: of(|c| c.holds),
-        faults: of(|c| c.faults),
-        ..*after
-    }
+/// Sends `bytes` bytes to a bridge whose host has stopped reading: the bridge's answers fill its transmit queue, it takes no
+/// more requests, and its receive queue fills. The bytes lost by the host's, the glove's and the gripper's port, once the
+/// host reads again.
+///
+/// # Panics
+/// The bridge does not answer then.
+pub fn flood(firmware: &Path, bytes: usize) -> [u32; 3] {
+    let mut emulator = bare(firmware);
+    let mut link = emulator.link().expect("a bridge");
+    let Address::Unix(path) = emulator.address() else {
+        panic!("an emulator's address is a socket")
+    };
+    // Samples go on for 2 s after the host's last word. Nobody reads them: the emulator's socket holds some hundred single
+    // bytes, the queue 1,024.
+    link.telemetry(20).expect("taken");
+    drop(link);
+    let mut line = UnixStream::connect(path).expect("the emulator's socket");
+    std::thread::sleep(Duration::from_secs(1));
+    // No zero among them: together they are the start of one frame that is too long.
+    line.write_all(&vec![0x55; bytes])
+        .expect("room in the socket");
+    std::thread::sleep(Duration::from_secs(3));
+    drop(line);
+    let mut link = emulator.link().expect("the bridge answers the next host");
+    link.counters().expect("an answer").bytes_lost
 }
 
 /// What cutting the power many times came to.

@@ -3,6 +3,7 @@
 pub mod bench;
 pub mod bits;
 pub mod chip;
+pub mod debugger;
 pub mod emulated;
 pub mod images;
 pub mod power_cuts;

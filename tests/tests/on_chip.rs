@@ -11,7 +11,10 @@ use gauntlet::host_link::{Error, HostLink};
 use gauntlet::interrupt::Interrupt;
 use hae::image::JointOrder;
 use loop_tests::chip::firmware;
-use loop_tests::emulated::{Loop, active, alone, bare, cut_power, flash, hold_clutch};
+use loop_tests::debugger;
+use loop_tests::emulated::{
+    Loop, active, alone, bare, cut_power, debugged, flash, flood, hold_clutch, restarted,
+};
 use loop_tests::images::{self, SHAPE, index_finger};
 
 /// A machine with much to do can keep the emulator waiting for longer than a sample may be old; the bridge then holds, as
@@ -54,6 +57,43 @@ fn every_fresh_glove_frame_is_answered_and_no_byte_is_lost_in_the_queues() {
     let stack = calm.grown.stack_used;
     println!("stack: {stack} bytes at most");
     assert!((1_000..32_768).contains(&stack), "{stack} bytes of stack");
+}
+
+#[test]
+fn bytes_that_find_the_queue_full_are_counted_and_the_bridge_goes_on() {
+    let Some(firmware) = firmware() else { return };
+    let _alone = alone();
+    let sent = 6_000;
+    let [host, glove, gripper] = flood(&firmware, sent);
+    println!("{sent} bytes to a bridge that takes none: {host} lost");
+    // The queue holds 2,048. A machine with much to do may not have delivered all when the host reads again; on one with
+    // little to do the next host's first words still find the queue full.
+    let greeting = 64;
+    assert!(
+        (1..=sent as u32 - 2_048 + greeting).contains(&host),
+        "{host}"
+    );
+    assert_eq!((glove, gripper), (0, 0), "the others' queues are their own");
+}
+
+#[test]
+fn a_loop_that_hangs_or_faults_starts_again_with_its_weights_and_an_open_clutch() {
+    let Some(firmware) = firmware() else { return };
+    let _alone = alone();
+    let mut emulator = debugged(&firmware);
+    let mut link = emulator.link().expect("a bridge");
+    flash(&mut link, &index_finger(4)).expect("weights");
+    // The first is for the watchdog, the second for the fault handler.
+    for instruction in [debugger::JUMP_TO_ITSELF, debugger::UNDEFINED] {
+        hold_clutch(&mut link, Duration::from_millis(300));
+        let before = link.status().expect("an answer").now_us;
+        drop(link);
+        debugger::patch_tick(&emulator.debugger(), instruction);
+        link = restarted(&mut emulator, before);
+        println!("{instruction:04x}: started again");
+        assert_eq!(active(&mut link), Some(4));
+        assert!(!link.status().expect("an answer").engaged);
+    }
 }
 
 #[test]
@@ -191,5 +231,35 @@ fn a_host_that_vanishes_in_the_middle_leaves_the_old_weights_and_the_next_goes_o
         .flash(&index_finger(6), &never, &mut |_| {})
         .expect("the rest");
     assert!(flashed.resumed_at > 18_000, "{flashed:?}");
+    assert_eq!(active(&mut next), Some(6));
+}
+
+#[test]
+fn a_host_that_vanishes_while_engaged_leaves_a_hold_that_the_next_one_can_end() {
+    let Some(firmware) = firmware() else { return };
+    let _alone = alone();
+    let mut emulator = bare(&firmware);
+    let mut link = emulator.link().expect("a bridge");
+    flash(&mut link, &index_finger(5)).expect("weights");
+    hold_clutch(&mut link, Duration::from_millis(300));
+    drop(link);
+    // The next host is refused until the first one's session has ended: `link` is patient for so long.
+    let mut next = emulator.link().expect("the next host");
+    let status = next.status().expect("an answer");
+    assert!(
+        status.engaged && !status.heartbeat && !status.state.is_moving(),
+        "{status:?}"
+    );
+    let refused = Failure::from(flash(&mut next, &index_finger(6)).expect_err("a hold"));
+    assert!(
+        refused.next_step().contains("gauntlet bridge release"),
+        "{refused}; try {}",
+        refused.next_step()
+    );
+    assert_eq!(active(&mut next), Some(5));
+    next.release().expect("taken");
+    let end = Instant::now() + Duration::from_secs(10);
+    while next.status().expect("an answer").engaged && Instant::now() < end {}
+    flash(&mut next, &index_finger(6)).expect("weights");
     assert_eq!(active(&mut next), Some(6));
 }
