@@ -6,11 +6,12 @@
 //! how it grows. Without a word it prints all there is about speed, and draws the growth into `target/bench-train`.
 
 use core::ops::ControlFlow;
+use core::ops::RangeInclusive;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
 use std::time::Instant;
-use trainer::algorithm::{InUnits, PairPlan, Plan, Schedule, Settings, Trainer};
+use trainer::algorithm::{InUnits, PairPlan, Schedule, Settings, Trainer};
 use trainer::cost::fast::Steps;
 use trainer::cost::reference::Autoencoder;
 use trainer::cost::{Cost, Lambda, Weights};
@@ -21,7 +22,6 @@ use trainer::model::Normalisation;
 use trainer::motion::Generator;
 use trainer::network::Network;
 use trainer::operator::{GroundTruth, Operator, Scripted, start_pairs};
-use trainer::optimizer::LearningRate;
 use trainer::shapes::ShapePair;
 
 type Result<T> = core::result::Result<T, Box<dyn core::error::Error>>;
@@ -124,26 +124,27 @@ fn schedule(word: &str) -> Result<Schedule> {
     Ok(match word {
         "paper" => Schedule::Paper,
         "fast" => Schedule::Fast,
-        numbers => {
-            let numbers: core::result::Result<Vec<f64>, _> =
-                numbers.split(',').map(str::parse).collect();
-            let [last, rate, start, ramp, batches, decay] = numbers?[..] else {
-                return Err(
-                    "a schedule is paper, fast or M2,rate,ramp start,ramp,batches,decay".into(),
-                );
-            };
-            Schedule::Custom(Plan {
-                stage_epochs: 100,
-                last_epochs: last as usize,
-                rate: LearningRate {
-                    initial: rate,
-                    decay,
-                    ..LearningRate::PAPER
-                },
-                ramp_start: start as usize,
-                ramp_epochs: ramp as usize,
-                batches: batches as usize,
-            })
+        words => {
+            let mut plan = Schedule::Fast.plan_for(2);
+            for word in words.split(',') {
+                let (name, value) = word
+                    .split_once('=')
+                    .ok_or("a schedule is paper, fast or name=value,…")?;
+                let number: f64 = value.parse()?;
+                match name {
+                    "m1" => plan.stage_epochs = number as usize,
+                    "m2" => plan.last_epochs = number as usize,
+                    "rate" => plan.rate.initial = number,
+                    "stage_rate" => plan.stage_rate = number,
+                    "decay" => plan.rate.decay = number,
+                    "start" => plan.ramp_start = number as usize,
+                    "ramp" => plan.ramp_epochs = number as usize,
+                    "batches" => plan.batches = number as usize,
+                    "cool" => plan.cooling_epochs = number as usize,
+                    _ => return Err(format!("unknown part of a schedule: {name}").into()),
+                }
+            }
+            Schedule::Custom(plan)
         }
     })
 }
@@ -158,6 +159,9 @@ fn train(
     let mut domain = domain(name, seed)?;
     domain.settings.schedule = schedule;
     domain.settings.threads = threads;
+    if let Ok(dev) = std::env::var("NORMAL") {
+        domain.settings.initialisation = trainer::network::Initialisation::Normal(dev.parse()?);
+    }
     let (start, before) = (Instant::now(), processor_seconds());
     let mut trainer = Trainer::new(&domain.train, &domain.targets, &domain.settings)?;
     let mut operator = InUnits {
@@ -192,10 +196,16 @@ fn median(mut values: Vec<f64>) -> [f64; 3] {
     [at(0.25), at(0.5), at(0.75)]
 }
 
-fn quality(name: &str, word: &str, seeds: u64, threads: usize) -> Result<()> {
+/// `5` for 1 to 5, `6-10` for those.
+fn seeds(word: &str) -> Result<RangeInclusive<u64>> {
+    let (first, last) = word.split_once('-').unwrap_or(("1", word));
+    Ok(first.parse()?..=last.parse()?)
+}
+
+fn quality(name: &str, word: &str, seeds: RangeInclusive<u64>, threads: usize) -> Result<()> {
     let schedule = schedule(word)?;
     let mut rows: [Vec<f64>; 6] = Default::default();
-    for seed in 1..=seeds {
+    for seed in seeds {
         let (m, [wall, processor]) = train(name, schedule, seed, threads)?;
         let values = [
             m.distortion,
@@ -439,7 +449,7 @@ fn main() -> Result<()> {
         "quality" => quality(
             word(1, "sp1"),
             word(2, "fast"),
-            word(3, "5").parse()?,
+            seeds(word(3, "5"))?,
             word(4, "2").parse()?,
         ),
         "speed" => {

@@ -278,7 +278,9 @@ impl Trainer {
     fn step(&mut self) {
         let weights = self.weights(self.epoch);
         let batch = self.epoch % self.plan.batches.max(1);
-        self.parts = self.engine.step(&weights, batch, &self.plan.rate);
+        let before = self.plan.stage_epochs * self.early_stages();
+        let rate = self.plan.rate_at(self.epoch, before);
+        self.parts = self.engine.step(&weights, batch, &rate);
         self.epoch += 1;
     }
 

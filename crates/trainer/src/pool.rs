@@ -213,8 +213,9 @@ fn help(shared: &Shared, this: usize) {
         let Some(job) = state.job else { continue };
         state.active += 1;
         drop(state);
-        let done =
-            std::panic::catch_unwind(core::panic::AssertUnwindSafe(|| shared.take_pieces(job, this)));
+        let done = std::panic::catch_unwind(core::panic::AssertUnwindSafe(|| {
+            shared.take_pieces(job, this)
+        }));
         if done.is_err() {
             shared.panicked.store(true, Ordering::Relaxed);
         }

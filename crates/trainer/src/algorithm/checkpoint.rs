@@ -10,7 +10,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 /// Version of this file's meaning.
-const VERSION: &str = "1";
+const VERSION: &str = "2";
 
 /// Why a checkpoint cannot be written or used.
 #[derive(Debug, thiserror::Error)]

@@ -94,7 +94,8 @@ impl PairPlan {
 pub enum Schedule {
     /// §3.2.2: M1 = 100, M2 = 8000, full batch.
     Paper,
-    /// For people: four times the rate, mini-batches of targets, and as many epochs as the task needs ([`Schedule::plan_for`]).
+    /// For people: fewer epochs at a higher rate, which falls to nothing at the end; mini-batches of targets where they do no harm
+    /// ([`Schedule::plan_for`]).
     Fast,
     /// Any other.
     Custom(Plan),
@@ -109,6 +110,10 @@ pub struct Plan {
     pub last_epochs: usize,
     /// The optimiser's.
     pub rate: LearningRate,
+    /// How much larger the rate is in all stages but the last.
+    pub stage_rate: f64,
+    /// The last epochs, in which the rate falls in a straight line to nothing on top of that; 0: it does not.
+    pub cooling_epochs: usize,
     /// Epochs of the last stage before λ3 leaves zero.
     pub ramp_start: usize,
     /// Epochs in which λ3 then rises to its full value.
@@ -124,19 +129,21 @@ impl Schedule {
         self.plan_for(4)
     }
 
-    /// Its numbers for a target of so many dimensions. A few hundred poses resolve a target of four dimensions only coarsely: after
-    /// some hundred epochs more of them gain nothing, and fold some maps. Planes and surfaces gain from 2000.
+    /// Its numbers for a target of so many dimensions. A few hundred poses resolve a target of four dimensions only coarsely, so that
+    /// fewer epochs do there. What was tried: docs/measurements/trainer.md.
     #[must_use]
     pub fn plan_for(&self, target_dimensions: usize) -> Plan {
         let fast = Plan {
-            stage_epochs: 100,
-            last_epochs: 2000,
+            stage_epochs: 200,
+            stage_rate: 2.0,
+            last_epochs: 6000,
             rate: LearningRate {
-                initial: 2e-3,
+                initial: 7e-4,
                 ..LearningRate::PAPER
             },
-            ramp_start: 250,
-            ramp_epochs: 500,
+            ramp_start: 1000,
+            ramp_epochs: 1500,
+            cooling_epochs: 1500,
             batches: 4,
         };
         match *self {
@@ -147,13 +154,24 @@ impl Schedule {
                 ramp_start: 1000,
                 ramp_epochs: 2000,
                 batches: 1,
+                cooling_epochs: 0,
+                stage_rate: 1.0,
             },
             Self::Fast if target_dimensions < 4 => fast,
+            // The whole cloud in every step: of a quarter of it the nearest target is too far away in four dimensions, and that
+            // makes the map steeper.
             Self::Fast => Plan {
-                last_epochs: 700,
-                ramp_start: 100,
-                ramp_epochs: 200,
-                ..fast
+                stage_epochs: 100,
+                stage_rate: 4.0 / 3.0,
+                last_epochs: 2000,
+                rate: LearningRate {
+                    initial: 1.5e-3,
+                    ..LearningRate::PAPER
+                },
+                ramp_start: 600,
+                ramp_epochs: 500,
+                cooling_epochs: 500,
+                batches: 1,
             },
             Self::Custom(plan) => plan,
         }
@@ -161,6 +179,20 @@ impl Schedule {
 }
 
 impl Plan {
+    /// The optimiser's rate of an epoch; the last stage has `last_epochs`, so many epochs come before it.
+    pub(super) fn rate_at(&self, epoch: usize, before: usize) -> LearningRate {
+        let factor = if epoch < before {
+            self.stage_rate
+        } else {
+            let left = (before + self.last_epochs).saturating_sub(epoch);
+            (left as f64 / (self.cooling_epochs as f64 + 1.0)).min(1.0)
+        };
+        LearningRate {
+            initial: self.rate.initial * factor,
+            ..self.rate
+        }
+    }
+
     /// The same schedule with another M2; the rise of λ3 keeps its share of it.
     #[must_use]
     pub fn with_last_epochs(self, last_epochs: usize) -> Self {
@@ -169,7 +201,54 @@ impl Plan {
             last_epochs,
             ramp_start: scale(self.ramp_start),
             ramp_epochs: scale(self.ramp_epochs),
+            cooling_epochs: scale(self.cooling_epochs),
             ..self
+        }
+    }
+
+    /// All its numbers, fit for a file's name.
+    pub(crate) fn slug(&self) -> String {
+        format!(
+            "{}x{}-{}x{}-{}-{}-{}-{}",
+            self.stage_epochs,
+            self.last_epochs,
+            self.stage_rate,
+            self.rate.initial,
+            self.ramp_start,
+            self.ramp_epochs,
+            self.cooling_epochs,
+            self.batches
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_is_raised_in_early_stages_and_falls_in_a_straight_line_at_the_end() {
+        let plan = Plan {
+            stage_epochs: 5,
+            stage_rate: 3.0,
+            last_epochs: 10,
+            cooling_epochs: 4,
+            ..Schedule::Paper.plan()
+        };
+        let rate = |epoch| plan.rate_at(epoch, 10).initial / plan.rate.initial;
+        assert_eq!([rate(0), rate(9)], [3.0, 3.0]);
+        assert_eq!([rate(10), rate(15)], [1.0, 1.0]);
+        let last = [rate(16), rate(17), rate(18), rate(19)];
+        for (rate, expected) in last.into_iter().zip([0.8, 0.6, 0.4, 0.2]) {
+            assert!((rate - expected).abs() < 1e-12, "{last:?}");
+        }
+    }
+
+    #[test]
+    fn the_paper_s_rate_is_its_own_in_every_epoch() {
+        let plan = Schedule::Paper.plan();
+        for epoch in [0, 399, 400, 8399] {
+            assert_eq!(plan.rate_at(epoch, 400), LearningRate::PAPER);
         }
     }
 }

@@ -37,6 +37,8 @@ fn short(batches: usize) -> Settings {
     Settings {
         schedule: Schedule::Custom(Plan {
             stage_epochs: 10,
+            cooling_epochs: 0,
+            stage_rate: 1.0,
             last_epochs: 120,
             rate: LearningRate {
                 initial: 2e-3,

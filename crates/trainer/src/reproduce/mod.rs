@@ -224,16 +224,7 @@ impl Cell {
     pub fn slug(&self) -> String {
         let schedule = match self.schedule {
             Schedule::Paper => "paper".to_owned(),
-            Schedule::Fast => "fast".to_owned(),
-            Schedule::Custom(plan) => format!(
-                "{}x{}-{}-{}-{}-{}",
-                plan.stage_epochs,
-                plan.last_epochs,
-                plan.rate.initial,
-                plan.ramp_start,
-                plan.ramp_epochs,
-                plan.batches
-            ),
+            Schedule::Fast | Schedule::Custom(_) => self.plan().slug(),
         };
         let start = match self.initialisation {
             Initialisation::Glorot => String::new(),

@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 fn short() -> Schedule {
     Schedule::Custom(Plan {
         stage_epochs: 3,
+        cooling_epochs: 0,
+        stage_rate: 1.0,
         last_epochs: 6,
         ramp_start: 1,
         ramp_epochs: 2,

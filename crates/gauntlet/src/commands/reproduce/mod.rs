@@ -76,6 +76,8 @@ pub struct Reproduce {
 /// Trainings of seconds: maps take shape, not more.
 const QUICK: algorithm::Plan = algorithm::Plan {
     stage_epochs: 30,
+    cooling_epochs: 0,
+    stage_rate: 1.0,
     last_epochs: 250,
     rate: LearningRate {
         initial: 2e-3,
