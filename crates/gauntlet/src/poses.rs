@@ -93,13 +93,19 @@ impl Motion {
                 format!("generated hand motion, {FRAMES} frames at {RATE_HZ} Hz, seed {seed}")
             }
             Self::Recorded { poses, name } => {
-                let length = poses
-                    .time_s
-                    .as_deref()
-                    .and_then(|times| Some(times.last()? - times.first()?));
-                let length = length.map_or_else(String::new, |s| format!(", {s:.1} s"));
+                let length = timed(poses).map_or_else(String::new, |s| format!(", {s:.1} s"));
                 format!("{name}, {} frames{length}", poses.rows.rows)
             }
+        }
+    }
+
+    /// How long a recording plays, seconds; `None` for motion that has no end.
+    pub fn length_s(&self) -> Option<f64> {
+        match self {
+            Self::Generated { .. } => None,
+            Self::Recorded { poses, .. } => Some(
+                timed(poses).unwrap_or(poses.rows.rows.saturating_sub(1) as f64 / ASSUMED_RATE_HZ),
+            ),
         }
     }
 
@@ -113,6 +119,12 @@ impl Motion {
             Self::Recorded { poses, .. } => Box::new(Played::new(poses)),
         }
     }
+}
+
+/// From the first to the last time of a recording that has times.
+fn timed(poses: &Poses) -> Option<f64> {
+    let times = poses.time_s.as_deref()?;
+    Some(times.last()? - times.first()?)
 }
 
 /// A recording that plays for ever: linear between frames, and led back to its start in [`RETURN_S`], for a jump there

@@ -25,4 +25,4 @@ pub(crate) mod random;
 pub mod reproduce;
 pub mod shapes;
 pub mod table3;
-pub(crate) mod whole_file;
+pub mod whole_file;

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use serde_json::json;
+use trainer::whole_file;
 
 use crate::failure::OrFail;
 use crate::outputs::{self, Kind};
@@ -46,7 +47,7 @@ pub(super) fn run(options: &Export) -> Result<()> {
     inputs.extend(options.int16.as_deref());
     outputs::check(&options.out, Kind::Image, &inputs)?;
     let weights = model::weights(&options.model, options.int16.as_deref())?;
-    std::fs::write(&options.out, &weights.image).or_fail(
+    whole_file::write(&options.out, &weights.image).or_fail(
         || format!("{} is not written", options.out.display()),
         "a folder with room that you may write in",
     )?;

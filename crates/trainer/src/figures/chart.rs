@@ -1,5 +1,6 @@
-//! Curves over one axis, several charts side by side.
+//! Curves over one axis, several charts on a sheet.
 
+use super::sheet::{Area, Drawn, FONT, Key, Sheet, rgb, text};
 use super::{Error, field, range, write};
 use core::fmt::Write as _;
 use plotters::prelude::*;
@@ -25,48 +26,65 @@ pub struct Chart {
     pub y_label: String,
     /// Powers of ten on the vertical axis; values that are not positive are left out.
     pub logarithmic: bool,
-    /// Values above are left out, as Figure 10 does.
+    /// Values above are left out, as Figure 10 does; below the charts they are told.
     pub ceiling: Option<f64>,
     /// The curves.
     pub curves: Vec<Curve>,
+    /// A colour (red, green, blue) a curve; none: by the curves' places.
+    pub colours: Vec<[u8; 3]>,
+    /// Below the charts, once.
+    pub note: String,
 }
 
 /// Size of one chart, pixels.
-const SIZE: (u32, u32) = (460, 360);
-/// Width of the legend.
-const LEGEND: u32 = 150;
+const SIZE: (u32, u32) = (460, 370);
+/// Width of the legend, the height of one of its lines and of a line below the charts.
+const LEGEND: u32 = 176;
+const LINE: u32 = 24;
 /// Up to so many points of a curve are drawn as dots too.
 const FEW: usize = 12;
+/// Values above the ceiling that are told.
+const TOLD: usize = 6;
 /// Size of titles and of the text at the axes.
-const TITLE: (&str, u32) = ("sans-serif", 15);
-const TEXT: (&str, u32) = ("sans-serif", 12);
+const TITLE: (&str, u32) = (FONT, 17);
+const TEXT: (&str, u32) = (FONT, 14);
 
-/// Draws charts side by side into `path` (SVG), the data beside it as CSV with the columns chart, curve, x, y.
+/// Draws charts with one legend into `path` (SVG), the data beside it as CSV with the columns chart, curve, x, y.
 ///
 /// # Errors
 /// [`Error`].
 pub fn charts(path: &Path, charts: &[Chart]) -> Result<(), Error> {
-    let mut svg = String::new();
-    let names = names(charts);
-    let width = SIZE.0 * charts.len().max(1) as u32;
-    let legend_width = if names.len() > 1 { LEGEND } else { 0 };
-    {
-        let size = (width + legend_width, SIZE.1);
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE).map_err(|e| Error::draw(path, &e))?;
-        let (drawn, beside) = root.split_horizontally(width);
-        for (area, chart) in drawn
-            .split_evenly((1, charts.len().max(1)))
-            .iter()
-            .zip(charts)
-        {
-            draw(area, chart, &names).map_err(|e| Error::draw(path, &e))?;
+    let legend = legend(charts);
+    let notes = notes(charts);
+    let columns = match charts.len() {
+        few @ 0..=3 => few.max(1),
+        4 => 2,
+        _ => 3,
+    };
+    let sheet = Sheet {
+        size: SIZE,
+        right: if legend.len() > 1 { LEGEND } else { 0 },
+        below: match notes.len() {
+            0 => 0,
+            lines => LINE * lines as u32 + 6,
+        },
+    };
+    let rows: Vec<Vec<&Chart>> = charts
+        .chunks(columns)
+        .map(|row| row.iter().collect())
+        .collect();
+    let each = |area: &Area<'_>, chart: &&Chart| draw(area, chart, &legend);
+    let svg = sheet.draw(path, &rows, each, |beside, below| {
+        if sheet.right > 0 {
+            for (place, key) in legend.iter().enumerate() {
+                key.draw(beside, (4, 48 + (LINE as usize * place) as i32), TEXT.1)?;
+            }
         }
-        if legend_width > 0 {
-            legend(&beside, &names).map_err(|e| Error::draw(path, &e))?;
+        for (place, note) in notes.iter().enumerate() {
+            text(below, note, (14, 12 + (LINE as usize * place) as i32), 13)?;
         }
-        root.present().map_err(|e| Error::draw(path, &e))?;
-    }
+        Ok(())
+    })?;
     let mut csv = String::from("chart,curve,x,y\n");
     for chart in charts {
         for curve in &chart.curves {
@@ -83,48 +101,77 @@ pub fn charts(path: &Path, charts: &[Chart]) -> Result<(), Error> {
     write(path, &svg, &csv)
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
-
-/// Every curve's name once, in the order in which they come: its place decides its colour.
-fn names(charts: &[Chart]) -> Vec<&str> {
-    let mut names: Vec<&str> = Vec::new();
-    for curve in charts.iter().flat_map(|chart| &chart.curves) {
-        if !names.contains(&curve.name.as_str()) {
-            names.push(&curve.name);
+/// Every curve's name once, in the order in which they come, with its colour: one legend for all charts, beside them, where it hides
+/// no curve.
+fn legend(charts: &[Chart]) -> Vec<Key> {
+    let mut keys: Vec<Key> = Vec::new();
+    for chart in charts {
+        for (place, curve) in chart.curves.iter().enumerate() {
+            if keys.iter().all(|key| key.text != curve.name) {
+                let own = chart.colours.get(place).copied();
+                keys.push(Key::line(
+                    &curve.name,
+                    own.unwrap_or_else(|| colour(keys.len())),
+                ));
+            }
         }
     }
-    names
+    keys
 }
 
-/// One legend for all charts, beside them, where it hides no curve.
-fn legend<'a>(area: &Area<'a>, names: &[&str]) -> Drawn<'a> {
-    for (place, name) in names.iter().enumerate() {
-        let y = 40 + 22 * place as i32;
-        let line = PathElement::new([(4, y), (26, y)], colour(place).stroke_width(3));
-        area.draw(&line)?;
-        let style = TEXT.into_font().color(&BLACK);
-        area.draw(&Text::new((*name).to_owned(), (32, y - 7), style))?;
+/// What stands below: the charts' notes, each once, and what is above a ceiling.
+fn notes(charts: &[Chart]) -> Vec<String> {
+    let mut notes: Vec<String> = Vec::new();
+    for chart in charts {
+        if !chart.note.is_empty() && !notes.contains(&chart.note) {
+            notes.push(chart.note.clone());
+        }
     }
-    Ok(())
+    for chart in charts {
+        let Some(ceiling) = chart.ceiling else {
+            continue;
+        };
+        let mut above = Vec::new();
+        for curve in &chart.curves {
+            let high = curve
+                .points
+                .iter()
+                .filter(|(_, y)| y.is_finite() && *y > ceiling);
+            above.extend(high.map(|(x, y)| format!("({}, {}, {y:.1})", curve.name, short(*x))));
+        }
+        if above.is_empty() {
+            continue;
+        }
+        let more = match above.len().saturating_sub(TOLD) {
+            0 => String::new(),
+            more => format!(" and {more} more, see the CSV file"),
+        };
+        above.truncate(TOLD);
+        let above = above.join(", ");
+        let (title, ceiling) = (&chart.title, short(ceiling));
+        notes.push(format!(
+            "{title}: above {ceiling}, not drawn: {above}{more}"
+        ));
+    }
+    notes
 }
 
-fn colour(place: usize) -> RGBColor {
-    const COLOURS: [(u8, u8, u8); 8] = [
-        (130, 130, 130),
-        (170, 110, 40),
-        (220, 160, 0),
-        (60, 150, 60),
-        (40, 110, 200),
-        (130, 40, 160),
-        (210, 30, 30),
-        (0, 160, 170),
+/// Colours that people with any kind of colour vision tell apart (those of Okabe and Ito, but for yellow).
+fn colour(place: usize) -> [u8; 3] {
+    const COLOURS: [[u8; 3]; 8] = [
+        [0, 114, 178],
+        [213, 94, 0],
+        [0, 158, 115],
+        [204, 121, 167],
+        [230, 159, 0],
+        [86, 180, 233],
+        [130, 130, 130],
+        [0, 0, 0],
     ];
-    let (red, green, blue) = COLOURS[place % COLOURS.len()];
-    RGBColor(red, green, blue)
+    COLOURS[place % COLOURS.len()]
 }
 
-fn draw<'a>(area: &Area<'a>, chart: &Chart, names: &[&str]) -> Drawn<'a> {
+fn draw(area: &Area<'_>, chart: &Chart, legend: &[Key]) -> Drawn {
     let shown = |&(x, y): &(f64, f64)| {
         let below = chart.ceiling.is_none_or(|ceiling| y <= ceiling);
         let y = if chart.logarithmic { libm::log10(y) } else { y };
@@ -135,7 +182,7 @@ fn draw<'a>(area: &Area<'a>, chart: &Chart, names: &[&str]) -> Drawn<'a> {
         .collect();
     let (left, right) = range(all.iter().map(|p| p.0));
     let (low, high) = range(all.iter().map(|p| p.1));
-    // Room for a whole power of ten at least, so that there are labels.
+    // Whole powers of ten, so that there are labels.
     let (low, high) = match chart.logarithmic {
         true => (libm::floor(low), libm::ceil(high)),
         false => (low, high),
@@ -143,8 +190,9 @@ fn draw<'a>(area: &Area<'a>, chart: &Chart, names: &[&str]) -> Drawn<'a> {
     let mut context = ChartBuilder::on(area)
         .caption(&chart.title, TITLE)
         .margin(8)
-        .x_label_area_size(34)
-        .y_label_area_size(52)
+        .margin_right(14)
+        .x_label_area_size(42)
+        .y_label_area_size(64)
         .build_cartesian_2d(left..right, low..high)?;
     let power = |y: &f64| {
         short(if chart.logarithmic {
@@ -153,13 +201,16 @@ fn draw<'a>(area: &Area<'a>, chart: &Chart, names: &[&str]) -> Drawn<'a> {
             *y
         })
     };
+    let lines = BLACK.mix(0.14);
     context
         .configure_mesh()
         .light_line_style(WHITE)
-        .bold_line_style(BLACK.mix(0.12))
+        .bold_line_style(lines)
         .x_desc(&chart.x_label)
         .y_desc(&chart.y_label)
+        .axis_desc_style(TEXT)
         .label_style(TEXT)
+        .x_labels(11)
         .x_label_formatter(&|x| short(*x))
         .y_labels(if chart.logarithmic {
             (high - low) as usize + 1
@@ -168,12 +219,21 @@ fn draw<'a>(area: &Area<'a>, chart: &Chart, names: &[&str]) -> Drawn<'a> {
         })
         .y_label_formatter(&power)
         .draw()?;
+    if chart.logarithmic {
+        // The multiples between the powers show which kind of axis it is.
+        let powers = low as i32..high as i32;
+        let between = powers.flat_map(|power| (2..10).map(move |m| (power, m)));
+        context.draw_series(between.map(|(power, multiple)| {
+            let y = f64::from(power) + libm::log10(f64::from(multiple));
+            PathElement::new(vec![(left, y), (right, y)], BLACK.mix(0.05))
+        }))?;
+    }
     for curve in &chart.curves {
-        let place = names.iter().position(|name| *name == curve.name);
-        let colour = colour(place.unwrap_or(0));
+        let key = legend.iter().find(|key| key.text == curve.name);
+        let colour = rgb(key.map_or([0, 0, 0], |key| key.colour));
         let points: Vec<(f64, f64)> = curve.points.iter().filter_map(shown).collect();
         // A single point would be a line of no length.
-        let dots = points.iter().map(|&p| Circle::new(p, 2, colour.filled()));
+        let dots = points.iter().map(|&p| Circle::new(p, 3, colour.filled()));
         if points.len() <= FEW {
             context.draw_series(dots)?;
         }

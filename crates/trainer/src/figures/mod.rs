@@ -4,11 +4,13 @@
 mod chart;
 mod panel;
 mod pca;
+mod sheet;
 mod sketch;
 
 pub use chart::{Chart, Curve, charts};
-pub use panel::{Panel, panels};
+pub use panel::{CLOUD, MARKS, Net, PATH, POINTS, Panel, View, panels};
 pub use pca::Principal;
+pub use sheet::{Key, Sign};
 pub use sketch::{Sketch, Stroke, sketches};
 
 use std::path::{Path, PathBuf};

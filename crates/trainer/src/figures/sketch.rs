@@ -1,5 +1,6 @@
 //! Line drawings that others make (of hands and grippers, say), laid out in rows with a title each.
 
+use super::sheet::{Area, Drawn, GREY, Key, Sheet, centred, rgb};
 use super::{Error, write};
 use plotters::prelude::*;
 use std::path::Path;
@@ -7,7 +8,7 @@ use std::path::Path;
 /// A line or a filled outline.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stroke {
-    /// Points, x to the right and y up, each from 0 to 1 over the drawing.
+    /// Points, x to the right and y up, each from 0 to 1 over the drawing, which is [`Sketch::ASPECT`] as high as wide.
     pub points: Vec<(f64, f64)>,
     /// Red, green, blue.
     pub colour: [u8; 3],
@@ -26,71 +27,61 @@ pub struct Sketch {
     pub strokes: Vec<Stroke>,
 }
 
-/// Size of one drawing with its title, pixels, and the heights of title and note.
-const SIZE: (u32, u32) = (170, 210);
-const TITLE: u32 = 22;
-const NOTE: u32 = 20;
+impl Sketch {
+    /// Height over width of the drawing without title and note.
+    pub const ASPECT: f32 = (SIZE.1 - TITLE - NOTE) as f32 / (SIZE.0 - 2 * MARGIN) as f32;
+}
 
-/// Draws rows of sketches into `path` (SVG), `csv` beside it.
+/// Size of one drawing with its title, pixels, its margins, and the heights of title and note.
+const SIZE: (u32, u32) = (170, 204);
+const MARGIN: u32 = 6;
+const TITLE: u32 = 24;
+const NOTE: u32 = 22;
+/// Room for one word of the key.
+const WORD: i32 = 200;
+
+/// Draws rows of sketches and, below, what their colours mean into `path` (SVG), `csv` beside it.
 ///
 /// # Errors
 /// [`Error`].
-pub fn sketches(path: &Path, rows: &[Vec<Sketch>], csv: &str) -> Result<(), Error> {
-    let columns = rows.iter().map(Vec::len).max().unwrap_or(0).max(1);
-    let count = rows.len().max(1);
-    let size = (SIZE.0 * columns as u32, SIZE.1 * count as u32);
-    let mut svg = String::new();
-    {
-        let root = SVGBackend::with_string(&mut svg, size).into_drawing_area();
-        root.fill(&WHITE).map_err(|e| Error::draw(path, &e))?;
-        let areas = root.split_evenly((count, columns));
-        for (row, areas) in rows.iter().zip(areas.chunks(columns)) {
-            for (sketch, area) in row.iter().zip(areas) {
-                draw(area, sketch).map_err(|e| Error::draw(path, &e))?;
-            }
+pub fn sketches(path: &Path, rows: &[Vec<Sketch>], key: &[Key], csv: &str) -> Result<(), Error> {
+    let sheet = Sheet {
+        size: SIZE,
+        right: 0,
+        below: if key.is_empty() { 0 } else { 34 },
+    };
+    let svg = sheet.draw(path, rows, draw, |_, below| {
+        for (place, word) in key.iter().enumerate() {
+            word.draw(below, (16 + WORD * place as i32, 15), 13)?;
         }
-        root.present().map_err(|e| Error::draw(path, &e))?;
-    }
+        Ok(())
+    })?;
     write(path, &svg, csv)
 }
 
-type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
-
-fn draw<'a>(area: &Area<'a>, sketch: &Sketch) -> Drawn<'a> {
-    let middle = plotters::style::text_anchor::Pos::new(
-        plotters::style::text_anchor::HPos::Center,
-        plotters::style::text_anchor::VPos::Top,
-    );
-    let text =
-        |size: u32, colour: RGBColor| ("sans-serif", size).into_font().color(&colour).pos(middle);
-    let (width, height) = (SIZE.0 as i32, SIZE.1 as i32);
-    area.draw(&Text::new(
-        sketch.title.clone(),
-        (width / 2, 5),
-        text(14, BLACK),
-    ))?;
-    let grey = RGBColor(90, 90, 90);
-    let below = (width / 2, height - NOTE as i32 + 2);
-    area.draw(&Text::new(sketch.note.clone(), below, text(11, grey)))?;
-    let (margin, top) = (6.0, f64::from(TITLE));
+fn draw(area: &Area<'_>, sketch: &Sketch) -> Drawn {
+    centred(area, &sketch.title, 6, 14, BLACK)?;
+    centred(area, &sketch.note, (SIZE.1 - NOTE) as i32 + 3, 12, GREY)?;
+    let across = f64::from(SIZE.0 - 2 * MARGIN);
     let tall = f64::from(SIZE.1 - TITLE - NOTE);
-    let across = f64::from(SIZE.0) - 2.0 * margin;
     let place = |&(x, y): &(f64, f64)| {
         (
-            libm::round(margin + x * across) as i32,
-            libm::round(top + (1.0 - y) * tall) as i32,
+            libm::round(f64::from(MARGIN) + x * across) as i32,
+            libm::round(f64::from(TITLE) + (1.0 - y) * tall) as i32,
         )
     };
     for stroke in &sketch.strokes {
-        let [red, green, blue] = stroke.colour;
-        let colour = RGBColor(red, green, blue);
+        let colour = rgb(stroke.colour);
         let points: Vec<(i32, i32)> = stroke.points.iter().map(place).collect();
         if stroke.width == 0 {
             area.draw(&Polygon::new(points, colour.filled()))?;
-        } else {
-            area.draw(&PathElement::new(points, colour.stroke_width(stroke.width)))?;
+            continue;
         }
+        // Round ends and joints.
+        for &point in &points {
+            area.draw(&Circle::new(point, stroke.width / 2, colour.filled()))?;
+        }
+        area.draw(&PathElement::new(points, colour.stroke_width(stroke.width)))?;
     }
     Ok(())
 }

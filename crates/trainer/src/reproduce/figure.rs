@@ -1,10 +1,10 @@
-//! The paper's figures from cells: Figure 1, the snapshots of Figure 3, curves over epochs (2, 11, 14 to 19) and over the number of
-//! pairs (4, 5, 10), the heat maps of Figure 6, the principal components of Figure 13. Drawn by [`crate::figures`].
+//! The paper's figures from cells: Figure 1, the snapshots of Figure 3, curves over epochs (2, 11, 14 to 17) and over the number of
+//! pairs (4, 5, 10, 18, 19), the heat maps of Figure 6, the principal components of Figure 13. Drawn by [`crate::figures`].
 
 use super::table::number;
 use super::{Cell, Error, Kept, Laboratory, Row, Source, Store, Watch, paper};
 use crate::data::Matrix;
-use crate::figures::{Chart, Curve, Panel, Principal};
+use crate::figures::{CLOUD, Chart, Curve, Key, MARKS, Net, PATH, POINTS, Panel, Principal, View};
 use crate::measures::{NEIGHBOURS, dissimilarities};
 use crate::network::Network;
 use crate::shapes::ShapePair;
@@ -57,29 +57,45 @@ pub fn snapshots(
     };
     let domains = laboratory.shape(pair)?;
     let snapshots = store.stages(laboratory, cell, watch)?;
-    let panels = snapshots
-        .into_iter()
-        .enumerate()
-        .map(|(stage, (f, pairs))| Panel {
-            title: format!("{}, session {}", pair.name(), stage + 1),
-            points: image(&f, &domains.truth.inputs),
-            grid: domains.grid.clone(),
-            outline: domains.boundary.targets.clone(),
-            marks: pairs.targets,
-            ..Panel::default()
+    let images: Vec<Matrix> = (snapshots.iter())
+        .map(|(f, _)| image(f, &domains.truth.inputs))
+        .collect();
+    // One scale for all sessions: the map is seen to stretch.
+    let mut room = domains.boundary.targets.clone();
+    for image in images.iter().flat_map(Matrix::iter_rows) {
+        room.push(image);
+    }
+    let panels =
+        (snapshots.into_iter().zip(images).enumerate()).map(|(stage, ((_, pairs), points))| {
+            Panel {
+                title: format!("{}, session {}", pair.name(), stage + 1),
+                points,
+                grid: domains.grid.clone(),
+                outline: domains.boundary.targets.clone(),
+                marks: pairs.targets,
+                room: room.clone(),
+                ..Panel::default()
+            }
         });
     Ok(panels.collect())
 }
 
-/// Figure 6: the image of the held-out nodes, each coloured by its own d-Knn, capped at [`HEAT_CAP`].
+/// Figure 6: the image of the held-out nodes, each coloured by its own d-Knn, capped at [`HEAT_CAP`], over that of the whole grid.
 ///
 /// # Errors
 /// [`Error`].
 pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Panel, Error> {
     let prepared = laboratory.prepare(cell)?;
-    let outline = match cell.source {
-        Source::Shape(pair) => laboratory.shape(pair)?.boundary.targets.clone(),
-        Source::Generated | Source::Recorded => Matrix::default(),
+    let (outline, net) = match cell.source {
+        Source::Shape(pair) => {
+            let domains = laboratory.shape(pair)?;
+            let net = Net {
+                points: image(f, &domains.truth.inputs),
+                grid: domains.grid.clone(),
+            };
+            (domains.boundary.targets.clone(), net)
+        }
+        Source::Generated | Source::Recorded => (Matrix::default(), Net::default()),
     };
     let images = image(f, &prepared.test);
     let lists = |samples: &Matrix| -> Vec<Vec<f64>> {
@@ -97,8 +113,9 @@ pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Pa
         ),
         points: images,
         outline,
+        net,
         heat: each.iter().map(|d| d.min(HEAT_CAP) / HEAT_CAP).collect(),
-        note: format!("d-Knn, 0 to {HEAT_CAP:.0} and more"),
+        note: format!("d-Knn of a held-out node, 0 to ≥ {HEAT_CAP:.0}"),
         ..Panel::default()
     })
 }
@@ -143,7 +160,7 @@ pub fn fold_share(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Res
     Ok(if whole > 0.0 { flipped / whole } else { 0.0 })
 }
 
-/// Figures 2, 11 and 14 to 16: the measures as they stood on the way, mean over the repetitions, a curve a row.
+/// Figures 2, 11 and 14 to 17: the measures as they stood on the way, mean over the repetitions, a curve a row.
 #[must_use]
 pub fn over_epochs(source: Source, done: &[(Cell, Kept)]) -> Vec<Chart> {
     charts(source, |row, measure| {
@@ -165,7 +182,7 @@ pub fn over_epochs(source: Source, done: &[(Cell, Kept)]) -> Vec<Chart> {
     .collect()
 }
 
-/// Figures 4, 5, 10 and 17 to 19: the measures over the number of pairs, mean over the repetitions, a curve a row.
+/// Figures 4, 5, 10, 18 and 19: the measures over the number of pairs, mean over the repetitions, a curve a row.
 #[must_use]
 pub fn over_pairs(source: Source, done: &[(Cell, Kept)]) -> Vec<Chart> {
     charts(source, |row, measure| {
@@ -184,27 +201,53 @@ pub fn over_pairs(source: Source, done: &[(Cell, Kept)]) -> Vec<Chart> {
     .collect()
 }
 
-/// Figure 13: samples, held-out samples or their images, marks and a motion along the three principal axes of `samples`.
+/// What Figure 13 shows of a domain.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown<'a> {
+    /// All samples: the axes are theirs.
+    pub samples: &'a Matrix,
+    /// What they are.
+    pub samples_are: &'a str,
+    /// Held-out samples or their images.
+    pub points: &'a Matrix,
+    /// What they are.
+    pub points_are: &'a str,
+    /// The reference pairs' side.
+    pub marks: &'a Matrix,
+    /// The motion.
+    pub motion: &'a Matrix,
+    /// Words at its ends.
+    pub ends: [&'a str; 2],
+}
+
+/// Figure 13: samples, points, reference pairs and a motion along the three principal axes of the samples.
 #[must_use]
-pub fn principal(
-    title: &str,
-    samples: &Matrix,
-    cloud: &Matrix,
-    marks: &Matrix,
-    motion: &Matrix,
-) -> Panel {
-    let axes = Principal::of(samples, 3);
+pub fn principal(title: &str, shown: &Shown<'_>) -> Panel {
+    let axes = Principal::of(shown.samples, 3);
     let share: f64 = axes.shares.iter().sum();
+    let [from, to] = shown.ends;
     Panel {
         title: title.to_owned(),
         note: format!(
-            "three axes, {:.0} % of the variance",
+            "the three principal axes (PC) hold {:.0} % of the variance",
             libm::round(100.0 * share)
         ),
-        points: axes.project(cloud),
-        cloud: axes.project(samples),
-        marks: axes.project(marks),
-        path: axes.project(motion),
+        points: axes.project(shown.points),
+        cloud: axes.project(shown.samples),
+        marks: axes.project(shown.marks),
+        path: axes.project(shown.motion),
+        path_ends: shown.ends.map(str::to_owned),
+        axes: (1..=axes.shares.len()).map(|i| format!("PC{i}")).collect(),
+        view: View {
+            turn: 28.0,
+            rise: 28.0,
+        },
+        key: vec![
+            Key::dot(shown.samples_are, CLOUD),
+            Key::dot(shown.points_are, POINTS),
+            Key::dot("reference pairs", MARKS),
+            Key::line(format!("motion {from} to {to}"), PATH),
+        ],
         ..Panel::default()
     }
 }
@@ -227,17 +270,22 @@ fn of(done: &[(Cell, Kept)], source: Source, row: Row) -> impl Iterator<Item = &
 fn charts(source: Source, points: impl Fn(Row, usize) -> Vec<(f64, f64)>) -> Vec<Chart> {
     let rows = Row::TABLE.iter().chain(&[Row::HaeFixed]);
     let charts = paper::MEASURES.iter().enumerate().map(|(measure, name)| {
-        let curves = rows.clone().map(|&row| Curve {
-            name: row.title().to_owned(),
-            points: points(row, measure),
+        let curves = rows.clone().map(|&row| {
+            let curve = Curve {
+                name: row.title().to_owned(),
+                points: points(row, measure),
+            };
+            (curve, row.colour())
         });
+        let (curves, colours) = curves.filter(|(curve, _)| !curve.points.is_empty()).unzip();
         Chart {
-            title: format!("{name}, {}", source.title()),
+            title: format!("{}: {}", source.title(), paper::MEASURES_IN_WORDS[measure]),
             y_label: (*name).to_owned(),
             // Folds and the first epochs stand out by orders of magnitude.
             logarithmic: measure >= 2 && matches!(source, Source::Shape(_)),
             ceiling: (measure == 2 && !matches!(source, Source::Shape(_))).then_some(CURVE_CAP),
-            curves: curves.filter(|curve| !curve.points.is_empty()).collect(),
+            curves,
+            colours,
             ..Chart::default()
         }
     });

@@ -10,7 +10,7 @@ mod table;
 
 pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch, gripper_samples};
 pub use store::{Kept, Store, run_all};
-pub use table::{Entry, Table, number};
+pub use table::{Entry, Order, Table, number};
 
 use crate::algorithm::{Plan, Schedule};
 use crate::cost::Cost;
@@ -100,6 +100,21 @@ impl Row {
             Self::HaeOne => "HAE (α=1)",
             Self::HaeAdaptive => "HAE (adap, α=1)",
             Self::HaeFixed => "HAE (fixed)",
+        }
+    }
+
+    /// In drawings, the same in all of them: red, green, blue.
+    #[must_use]
+    pub const fn colour(self) -> [u8; 3] {
+        match self {
+            Self::Pin => [140, 140, 140],
+            Self::CaePin => [60, 60, 60],
+            Self::PinBa => [230, 159, 0],
+            Self::DistortionPinBa => [0, 158, 115],
+            Self::HaeZero => [86, 180, 233],
+            Self::HaeOne => [0, 114, 178],
+            Self::HaeAdaptive => [213, 74, 0],
+            Self::HaeFixed => [180, 90, 160],
         }
     }
 

@@ -5,6 +5,7 @@ use super::stats::{Summary, TTest, paired_t_test, summary};
 use super::{Cell, Kept, Row, Source};
 use crate::algorithm::Schedule;
 use crate::measures::Measures;
+use crate::shapes::ShapePair;
 
 /// One number of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,6 +86,65 @@ impl Table {
     }
 }
 
+/// What a right implementation's rows have in common, whatever the repetitions: an order between means.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Order {
+    /// In words.
+    pub what: &'static str,
+    /// Whether it holds here.
+    pub holds: bool,
+}
+
+impl Table {
+    /// The orders that are known of this source, by means; none of a recording, whose motion decides.
+    #[must_use]
+    pub fn orders(&self) -> Vec<Order> {
+        let mean = |row: Row, measure: usize| {
+            let entries = self.rows.iter().find(|(name, _)| *name == row);
+            let ours = entries.and_then(|(_, entries)| entries[measure].ours);
+            ours.map_or(f64::NAN, |ours| ours.mean)
+        };
+        let all = |rows: &[Row], holds: &dyn Fn(Row) -> bool| rows.iter().all(|&row| holds(row));
+        let hae = [Row::HaeZero, Row::HaeOne, Row::HaeAdaptive];
+        let with_distortion = Row::DistortionPinBa;
+        match self.source {
+            Source::Shape(ShapePair::Sp1) => vec![
+                Order {
+                    what: "d̄: CAE + Pin < HAE < Pin + BA",
+                    holds: all(&hae, &|row| {
+                        mean(Row::CaePin, 0) < mean(row, 0) && mean(row, 0) < mean(Row::PinBa, 0)
+                    }),
+                },
+                Order {
+                    what: "VO: ≥ 0.92 with BA, ≤ 0.75 without",
+                    // HAE (α=0) folds with some random pairs: its median is held to a range instead.
+                    holds: all(
+                        &[Row::PinBa, with_distortion, Row::HaeOne, Row::HaeAdaptive],
+                        &|row| mean(row, 1) >= 0.92,
+                    ) && all(&[Row::Pin, Row::CaePin], &|row| mean(row, 1) <= 0.75),
+                },
+                Order {
+                    what: "d-Knn: HAE < ‖J‖² + Pin + BA",
+                    holds: all(&hae, &|row| mean(row, 2) < mean(with_distortion, 2)),
+                },
+            ],
+            Source::Generated => vec![
+                Order {
+                    what: "d̄: least for CAE + Pin, greatest for Pin + BA",
+                    holds: all(&Row::TABLE, &|row| {
+                        mean(Row::CaePin, 0) <= mean(row, 0) && mean(row, 0) <= mean(Row::PinBa, 0)
+                    }),
+                },
+                Order {
+                    what: "d-Knn: HAE (α=1) and HAE (adap) < ‖J‖² + Pin + BA",
+                    holds: all(&hae[1..], &|row| mean(row, 2) < mean(with_distortion, 2)),
+                },
+            ],
+            Source::Shape(_) | Source::Recorded => Vec::new(),
+        }
+    }
+}
+
 /// d̄, VO, d-Knn, NMSE by number; NaN for what is not there.
 #[must_use]
 pub fn number(measures: &Measures, which: usize) -> f64 {
@@ -100,7 +160,6 @@ pub fn number(measures: &Measures, which: usize) -> f64 {
 mod tests {
     use super::*;
     use crate::data::Pairs;
-    use crate::shapes::ShapePair;
 
     fn kept(distortion: f64) -> Kept {
         Kept {
@@ -138,5 +197,40 @@ mod tests {
         assert_eq!(adaptive[3].ours, None);
         // Equal differences have no t; unequal ones would.
         assert_eq!(table.tests, [None, None]);
+    }
+
+    #[test]
+    fn an_order_between_means_holds_or_does_not() {
+        let source = Source::Shape(ShapePair::Sp1);
+        let table = |adaptive: f64| {
+            let done: Vec<(Cell, Kept)> = Table::cells(&[source], 1, Schedule::Paper)
+                .into_iter()
+                .map(|cell| {
+                    let (distortion, occupancy, dissimilarity) = match cell.row {
+                        Row::Pin => (1.3, 0.5, 100.0),
+                        Row::CaePin => (0.7, 0.3, 10.0),
+                        Row::PinBa => (2.4, 0.97, 4.0),
+                        Row::DistortionPinBa => (2.0, 0.96, 12.0),
+                        Row::HaeAdaptive => (adaptive, 0.97, 2.5),
+                        _ => (2.1, 0.96, 2.6),
+                    };
+                    let mut kept = kept(distortion);
+                    kept.measures.occupancy = Some(occupancy);
+                    kept.measures.dissimilarity = dissimilarity;
+                    (cell, kept)
+                })
+                .collect();
+            let orders = Table::of(source, &done).orders();
+            orders.iter().map(|order| order.holds).collect::<Vec<_>>()
+        };
+        assert_eq!(table(2.2), [true, true, true]);
+        assert_eq!(table(2.5), [false, true, true]);
+        assert!(
+            Table::of(source, &[])
+                .orders()
+                .iter()
+                .all(|order| !order.holds)
+        );
+        assert!(Table::of(Source::Recorded, &[]).orders().is_empty());
     }
 }

@@ -3,7 +3,7 @@
 //! Colours say what moves what: thumb and finger A, index and finger B, ring and little finger and finger C.
 
 use glove::hand::{JOINT_COUNT, Side, segment_orientations};
-use trainer::figures::{Sketch, Stroke};
+use trainer::figures::{Key, Sketch, Stroke};
 
 use crate::record::AXES;
 
@@ -29,15 +29,15 @@ const PALM: View = View {
     turn: -0.55,
     rise: 0.25,
 };
-/// A gripper from the side of fingers B and C, from above.
+/// A gripper half from the side, so that bent fingers look bent: A to the left, C in front, B to the right.
 const FRONT: View = View {
-    turn: 0.2,
-    rise: 0.45,
+    turn: 0.9,
+    rise: 0.35,
 };
 
-/// Millimetres shown: across, and up.
-const ACROSS: (f32, f32) = (-85.0, 115.0);
-const UP: (f32, f32) = (-50.0, 190.0);
+/// Millimetres shown: across, and up from here, in the same scale.
+const ACROSS: (f32, f32) = (-88.0, 116.0);
+const LOWEST: f32 = -22.0;
 
 /// First joint of each digit in the hand's frame (x to the thumb, y to the back, z to the fingertips), and lengths of its bones, mm.
 const DIGITS: [(Point, [f32; 3], Colour); 5] = [
@@ -47,6 +47,18 @@ const DIGITS: [(Point, [f32; 3], Colour); 5] = [
     ([-15.0, 1.0, 88.0], [42.0, 27.0, 21.0], RING_C),
     ([-33.0, -3.0, 79.0], [33.0, 20.0, 19.0], RING_C),
 ];
+
+/// What the colours mean.
+pub(super) fn key() -> Vec<Key> {
+    [
+        ("thumb; finger A", THUMB_A),
+        ("index; finger B", INDEX_B),
+        ("middle", MIDDLE),
+        ("ring, little; finger C", RING_C),
+    ]
+    .map(|(words, colour)| Key::line(words, colour))
+    .into()
+}
 
 /// The thumb's rest: a flat hand's thumb points aside, and bends across the palm.
 fn thumb_rest() -> glove::hand::Quaternion {
@@ -105,7 +117,7 @@ pub(super) fn gripper(counts: &[f32]) -> Sketch {
     let Ok([a, b, c, scissor]) = <[f32; AXES]>::try_from(counts) else {
         return Sketch::default();
     };
-    let (wide, deep, low) = (50.0, 38.0, -25.0);
+    let (wide, deep, low) = (50.0, 38.0, 4.0);
     let top: Vec<Point> = vec![
         [-wide, -deep, 30.0],
         [wide, -deep, 30.0],
@@ -118,9 +130,20 @@ pub(super) fn gripper(counts: &[f32]) -> Sketch {
         [0.8 * wide, -0.8 * deep, low],
         [-0.8 * wide, -0.8 * deep, low],
     ];
+    let side: Vec<Point> = vec![
+        [-wide, -deep, 30.0],
+        [-wide, deep, 30.0],
+        [-0.8 * wide, 0.8 * deep, low],
+        [-0.8 * wide, -0.8 * deep, low],
+    ];
     // Counts 0: fingers B and C widest apart, 16° each; 255: their tips meet.
     let aside = 0.28 * (1.0 - 2.0 * scissor / 255.0);
     let mut parts = vec![
+        Part {
+            line: side,
+            colour: [178, 182, 190],
+            width: 0,
+        },
         Part {
             line: front,
             colour: METAL,
@@ -217,7 +240,8 @@ impl View {
     fn place(self, point: Point) -> (f64, f64) {
         let (across, _, up) = self.seen(point);
         let share = |value: f32, (low, high): (f32, f32)| f64::from((value - low) / (high - low));
-        (share(across, ACROSS), share(up, UP))
+        let highest = LOWEST + Sketch::ASPECT * (ACROSS.1 - ACROSS.0);
+        (share(across, ACROSS), share(up, (LOWEST, highest)))
     }
 }
 

@@ -1,26 +1,17 @@
 //! The figures: which trainings go into which drawing.
 
-use std::fmt::Write as _;
-
 use anyhow::Result;
-use glove::hand::{JOINT_COUNT, JOINT_NAMES};
 use serde_json::{Value, json};
-use trainer::data::{Matrix, write_pairs, write_samples};
-use trainer::figures::{Chart, Panel, Sketch, charts, panels, sketches};
-use trainer::reproduce::figure::{
-    fold_share, heat, over_epochs, over_pairs, principal, shapes, snapshots,
-};
+use trainer::data::{write_pairs, write_samples};
+use trainer::figures::{Chart, Panel, charts, panels};
+use trainer::reproduce::figure::{fold_share, heat, over_epochs, over_pairs, shapes, snapshots};
 use trainer::reproduce::paper::MEASURES;
 use trainer::reproduce::{Cell, Kept, Source};
 use trainer::shapes::ShapePair;
-use trainer::table3::POSES;
 
 use super::Bench;
-use super::drawings::{gripper, hand};
 use super::what::{APPENDIX, What};
 use crate::failure::told;
-use crate::poses::Motion;
-use crate::record::{AXES, AXIS_NAMES};
 
 const SP1: [Source; 1] = [Source::Shape(ShapePair::Sp1)];
 /// d̄, VO, d-Knn, NMSE.
@@ -29,9 +20,6 @@ const OCCUPANCY: usize = 1;
 const NMSE: usize = 3;
 /// Target samples of a shape (§3.2.1).
 const TARGETS: usize = 8000;
-/// Poses of Figure 12: a quarter of a second apart.
-const SNAPSHOTS: usize = 25;
-const SNAPSHOT_S: f64 = 0.25;
 /// A flipped share of the map between these is a fold or a twist; beyond, the map is whole, or mirrored as a whole.
 const FLIPPED: core::ops::RangeInclusive<f64> = 0.05..=0.95;
 
@@ -76,6 +64,10 @@ impl Bench<'_> {
         let is_wanted = |chart: &Chart| measures.iter().any(|&m| MEASURES[m] == chart.y_label);
         let drawn: Vec<Chart> = (sources.iter())
             .flat_map(|&source| of(source).into_iter().filter(is_wanted))
+            .map(|chart| Chart {
+                note: self.frame.describe(),
+                ..chart
+            })
             .collect();
         let path = self.folder.join(format!("{}.svg", what.name()));
         charts(&path, &drawn).map_err(told)?;
@@ -86,7 +78,7 @@ impl Bench<'_> {
         ))
     }
 
-    fn panels(&self, what: What, rows: &[Vec<Panel>], more: Value) -> Result<Value> {
+    pub(super) fn panels(&self, what: What, rows: &[Vec<Panel>], more: Value) -> Result<Value> {
         let path = self.folder.join(format!("{}.svg", what.name()));
         panels(&path, rows).map_err(told)?;
         Ok(self.wrote(what, &[path.clone(), path.with_extension("csv")], more))
@@ -171,7 +163,7 @@ impl Bench<'_> {
             panel.title = if size > 0.0 {
                 format!("{word}: {}, {:.0} % flipped", panel.title, 100.0 * flipped)
             } else {
-                format!("no {word} in seeds 1 to {seeds}; {}", panel.title)
+                format!("no {word} in {}; {}", range_of(seeds), panel.title)
             };
             let text = if size > 0.0 {
                 format!(
@@ -183,7 +175,8 @@ impl Bench<'_> {
                 )
             } else {
                 format!(
-                    "           no {word} among seeds 1 to {seeds}; the first is drawn (more: --seeds)"
+                    "           no {word} in {}; the first is drawn (more: --seeds)",
+                    range_of(seeds)
                 )
             };
             self.work.say(&self.tell, &text);
@@ -200,179 +193,12 @@ impl Bench<'_> {
         }
         self.panels(what, &[row], json!(found))
     }
-
-    /// Figure 9: a hand and a gripper for each pair.
-    fn chosen_pairs(&self, what: What, done: &[(Cell, Kept)]) -> Result<Value> {
-        let pairs = done
-            .first()
-            .map(|(_, kept)| kept.pairs.clone())
-            .unwrap_or_default();
-        let (mut hands, mut grippers) = (Vec::new(), Vec::new());
-        let mut csv = format!(
-            "pair,like,{},{}\n",
-            JOINT_NAMES.join(","),
-            AXIS_NAMES.join(",")
-        );
-        let mut names = Vec::new();
-        for (number, (q, x)) in pairs
-            .inputs
-            .iter_rows()
-            .zip(pairs.targets.iter_rows())
-            .enumerate()
-        {
-            let like = like(x);
-            hands.push(Sketch {
-                title: format!("q{}", number + 1),
-                ..hand(q)
-            });
-            grippers.push(Sketch {
-                title: format!("x{}", number + 1),
-                note: like.to_owned(),
-                ..gripper(x)
-            });
-            let _ = writeln!(csv, "{},\"{like}\",{},{}", number + 1, joined(q), joined(x));
-            names.push(like);
-        }
-        self.sketches(what, &[hands, grippers], &csv, json!(names))
-    }
-
-    /// Figure 12: six seconds of motion, every second of the 25 poses drawn.
-    fn trajectory(&self, what: What) -> Result<Value> {
-        let (hands, grippers) = self.motion()?;
-        let mut csv = format!(
-            "pose,time_s,{},{}\n",
-            JOINT_NAMES.join(","),
-            AXIS_NAMES.join(",")
-        );
-        for (index, (q, x)) in hands.iter_rows().zip(grippers.iter_rows()).enumerate() {
-            let time = index as f64 * SNAPSHOT_S;
-            let _ = writeln!(csv, "{index},{time},{},{}", joined(q), joined(x));
-        }
-        let half = |range: core::ops::RangeInclusive<usize>| -> [Vec<Sketch>; 2] {
-            let shown: Vec<usize> = range.step_by(2).filter(|&i| i < hands.rows).collect();
-            let hand = |&i: &usize| Sketch {
-                title: format!("q{i}"),
-                note: format!("{} s", i as f64 * SNAPSHOT_S),
-                ..hand(hands.row(i))
-            };
-            let gripper = |&i: &usize| Sketch {
-                title: format!("x{i}"),
-                note: counts(grippers.row(i)),
-                ..gripper(grippers.row(i))
-            };
-            [
-                shown.iter().map(hand).collect(),
-                shown.iter().map(gripper).collect(),
-            ]
-        };
-        let [first, second] = [half(0..=12), half(12..=24)];
-        self.sketches(what, &[first, second].concat(), &csv, Value::Null)
-    }
-
-    /// Figure 13.
-    fn principal_axes(&self, what: What, done: &[(Cell, Kept)]) -> Result<Value> {
-        let cell = self.frame.hand_map();
-        let prepared = self.laboratory.prepare(&cell).map_err(told)?;
-        let model = self.store.model(&cell).map_err(told)?;
-        let pairs = done
-            .first()
-            .map(|(_, kept)| kept.pairs.clone())
-            .unwrap_or_default();
-        let (motion, image) = self.motion()?;
-        let mut all = prepared.train.clone();
-        for row in prepared.test.iter_rows() {
-            all.push(row);
-        }
-        let mut images = Matrix::default();
-        for row in prepared.test.iter_rows() {
-            images.push(&model.f.eval(row));
-        }
-        let hands = principal(
-            "hand poses",
-            &all,
-            &prepared.test,
-            &model.q.apply_all(&pairs.inputs),
-            &model.q.apply_all(&motion),
-        );
-        let grippers = principal(
-            "gripper poses",
-            &prepared.targets,
-            &images,
-            &model.x.apply_all(&pairs.targets),
-            &model.x.apply_all(&image),
-        );
-        self.panels(what, &[vec![hands, grippers]], Value::Null)
-    }
-
-    fn sketches(&self, what: What, rows: &[Vec<Sketch>], csv: &str, more: Value) -> Result<Value> {
-        let path = self.folder.join(format!("{}.svg", what.name()));
-        sketches(&path, rows, csv).map_err(told)?;
-        Ok(self.wrote(what, &[path.clone(), path.with_extension("csv")], more))
-    }
-
-    /// Six seconds of motion that did not train, where most happens, and its image.
-    fn motion(&self) -> Result<(Matrix, Matrix)> {
-        let cell = self.frame.hand_map();
-        let model = self.store.model(&cell).map_err(told)?;
-        let generated = Motion::Generated { seed: cell.seed };
-        let mut source = self.motion.as_ref().unwrap_or(&generated).source();
-        // The generator's first 69 seconds train.
-        let first_s = if self.motion.is_some() { 0.0 } else { 70.0 };
-        let mut window = |start_s: f64| -> Vec<[f32; JOINT_COUNT]> {
-            (0..SNAPSHOTS)
-                .map(|i| source.pose_at(start_s + i as f64 * SNAPSHOT_S))
-                .collect()
-        };
-        let way = |poses: &[[f32; JOINT_COUNT]]| -> f32 {
-            let steps = poses.windows(2);
-            steps
-                .map(|two| {
-                    two[0]
-                        .iter()
-                        .zip(&two[1])
-                        .map(|(a, b)| (a - b).abs())
-                        .sum::<f32>()
-                })
-                .sum()
-        };
-        let mut best = window(first_s);
-        for second in 1..15 {
-            let other = window(first_s + f64::from(second));
-            if way(&other) > way(&best) {
-                best = other;
-            }
-        }
-        let hands = Matrix::from_rows(&best);
-        let grippers = model.map_all(&hands);
-        Ok((hands, grippers))
-    }
 }
 
-fn joined(values: &[f32]) -> String {
-    let texts: Vec<String> = values.iter().map(f32::to_string).collect();
-    texts.join(",")
-}
-
-fn counts(position: &[f32]) -> String {
-    let texts: Vec<String> = position.iter().map(|count| format!("{count:.0}")).collect();
-    texts.join(" ")
-}
-
-/// The name of the pose of Table 3 that is most like this position, or its counts when none is.
-fn like(position: &[f32]) -> String {
-    const NEAR: f32 = 110.0;
-    let Ok(position) = <[f32; AXES]>::try_from(position) else {
-        return String::new();
-    };
-    let far = |counts: &[f32; AXES]| {
-        let squares = counts.iter().zip(&position).map(|(a, b)| (a - b) * (a - b));
-        squares.sum::<f32>().sqrt()
-    };
-    let nearest = POSES
-        .iter()
-        .min_by(|a, b| far(&a.counts).total_cmp(&far(&b.counts)));
-    match nearest {
-        Some(pose) if far(&pose.counts) < NEAR => pose.name.to_owned(),
-        _ => counts(&position),
+/// Seeds in words.
+fn range_of(seeds: u64) -> String {
+    match seeds {
+        1 => "seed 1".to_owned(),
+        seeds => format!("seeds 1 to {seeds}"),
     }
 }

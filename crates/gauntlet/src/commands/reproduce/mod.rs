@@ -2,6 +2,7 @@
 
 mod drawings;
 mod figures;
+mod hand_figures;
 mod tables;
 mod what;
 mod work;

@@ -8,6 +8,7 @@ use serde_json::{Value, json};
 use trainer::reproduce::paper::MEASURES;
 use trainer::reproduce::{Cell, Entry, Kept, Source, Table, paper};
 use trainer::shapes::ShapePair;
+use trainer::whole_file;
 
 use super::Bench;
 use super::what::What;
@@ -66,7 +67,22 @@ impl Bench<'_> {
             }
         }
         if is_any_outside {
-            text.push_str("← the median lies outside the range in which a right implementation lies (paper schedule, 5 seeds or more)\n");
+            text.push_str(
+                "← the median lies outside the range in which a right implementation lies",
+            );
+            text.push_str(if self.frame.is_full() {
+                "\n"
+            } else {
+                " with the paper's schedule and 5 repetitions or more: this run has less\n"
+            });
+        }
+        for order in table.orders() {
+            let holds = if order.holds {
+                "holds"
+            } else {
+                "does not hold"
+            };
+            let _ = writeln!(text, "means: {}: {holds}", order.what);
         }
         text.push_str(&tests(table));
         text.push('\n');
@@ -217,16 +233,19 @@ fn as_json(table: &Table) -> Value {
     let tests = table.tests.iter().map(|test| {
         test.map(|test| json!({ "t": test.t, "degrees_of_freedom": test.freedom, "p": test.p }))
     });
+    let orders = table.orders();
+    let orders = (orders.iter()).map(|order| json!({ "what": order.what, "holds": order.holds }));
     json!({
         "data": table.source.name(),
         "rows": rows.collect::<Vec<_>>(),
+        "orders": orders.collect::<Vec<_>>(),
         "t_tests": tests.collect::<Vec<_>>(),
     })
 }
 
-/// Writes a text file.
+/// Writes a text file, whole or not at all.
 pub(super) fn save(path: &Path, text: &str) -> Result<()> {
-    std::fs::write(path, text).or_fail(
+    whole_file::write(path, text.as_bytes()).or_fail(
         || format!("the file {}", path.display()),
         "a folder where you may write, with room",
     )

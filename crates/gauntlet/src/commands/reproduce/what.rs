@@ -85,6 +85,32 @@ pub struct Frame {
 const CURVE_POINTS: usize = 42;
 
 impl Frame {
+    /// Whether the known ranges are meant for such a run: the paper's schedule and start, five repetitions or more.
+    pub fn is_full(&self) -> bool {
+        matches!(
+            (self.schedule, self.initialisation),
+            (Schedule::Paper, Initialisation::Glorot)
+        ) && self.seeds >= 5
+    }
+
+    /// For below a drawing: how many trainings a number is the mean of, and how long they were.
+    pub fn describe(&self) -> String {
+        let schedule = match self.schedule {
+            Schedule::Paper => "the paper's schedule".to_owned(),
+            Schedule::Fast => "the fast schedule".to_owned(),
+            Schedule::Custom(plan) => {
+                format!(
+                    "{} epochs in the last session, not the paper's number",
+                    plan.last_epochs
+                )
+            }
+        };
+        match self.seeds {
+            1 => format!("one repetition; {schedule}"),
+            seeds => format!("means over {seeds} repetitions; {schedule}"),
+        }
+    }
+
     /// The trainings that `what` needs before it can be shown.
     pub fn cells(&self, what: What) -> Vec<Cell> {
         match what {
