@@ -67,8 +67,8 @@ impl Progress {
             }
             Display::Lines { last } if last.elapsed() >= LINE_EVERY => {
                 *last = Instant::now();
-                let (what, total) = (self.what, self.total);
-                note!("{what}: {done} of {total}, {}{left}", detail());
+                let percent = 100 * done.min(self.total) / self.total.max(1);
+                note!("{}: {percent} %, {}{left}", self.what, detail());
             }
             Display::Lines { .. } | Display::Quiet => {}
         }

@@ -126,3 +126,21 @@ fn images_are_not_made_of_what_cannot_be_one() {
     let output = run(&["flash", path(&image), "--bridge", bridge]);
     assert!(refusal(&output, 1).contains("damaged"));
 }
+
+#[test]
+fn an_image_takes_the_place_of_an_old_one_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let (image, _) = export(folder.path(), "weights.hae", &[]);
+    let before = std::fs::read(&image).unwrap();
+    // Another name of the old file: bytes written into it would show there, a renamed file does not.
+    let witness = folder.path().join("witness.hae");
+    std::fs::hard_link(&image, &witness).unwrap();
+    let poses = poses_file(folder.path(), 60);
+    export(folder.path(), "weights.hae", &["--int16", path(&poses)]);
+    assert_ne!(std::fs::read(&image).unwrap(), before);
+    assert!(
+        std::fs::read(&witness).unwrap() == before,
+        "written in place"
+    );
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 3);
+}

@@ -97,6 +97,83 @@ fn the_shapes_files_train_as_any_two_domains() {
     ]));
     assert_eq!(said["quality"]["samples"], 476);
     assert_eq!(said["quality"]["true_pairs"], 476);
+    // The matched outlines lie outside the nodes, most on SP2, and train all the same.
+    for shape in ["sp1", "sp2", "sp3", "sp4"] {
+        let part = |part: &str| file(&format!("{shape}-{part}.csv"));
+        let words = [
+            [
+                "train",
+                "--input",
+                &part("input"),
+                "--target",
+                &part("target"),
+            ],
+            [
+                "--pairs-file",
+                &part("ring"),
+                "--pairs",
+                "boundary:4",
+                "--json",
+            ],
+            ["--schedule", "fast", "--epochs", "2", "--out"],
+        ];
+        let said = json(&run(&[&words.concat()[..], &[&out]].concat()));
+        assert_eq!(said["pairs"], 4);
+        assert!(!said["warnings"].to_string().contains("outside"), "{said}");
+    }
+}
+
+#[test]
+fn a_table_holds_the_orders_and_dashes_and_replaces_an_old_one_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let table = folder.path().join("table4.txt");
+    let witness = folder.path().join("witness");
+    std::fs::write(&table, "old").unwrap();
+    std::fs::hard_link(&table, &witness).unwrap();
+    let said = json(&reproduce(folder.path(), &["table4", "--json"]));
+    let written = std::fs::read_to_string(&table).unwrap();
+    assert_eq!(std::fs::read_to_string(&witness).unwrap(), "old");
+    assert!(
+        written.contains("± —") && written.contains("means: d-Knn: HAE"),
+        "{written}"
+    );
+    assert!(
+        !written.contains("← outside") || written.contains("this run has less"),
+        "{written}"
+    );
+    let result = &said["results"][0]["result"][0];
+    assert_eq!(result["rows"].as_array().unwrap().len(), 7);
+    assert_eq!(result["orders"].as_array().unwrap().len(), 2);
+}
+
+#[test]
+fn a_run_that_is_killed_goes_on_and_gives_what_an_unbroken_one_gives() {
+    let (killed, whole) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let words = ["fig6", "--seeds", "4"];
+    let out = killed.path().to_str().unwrap();
+    let mut child = command(&[&["reproduce", "--out", out, "--epochs", "2"][..], &words].concat())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let trainings = killed.path().join("trainings");
+    let until = std::time::Instant::now() + Duration::from_secs(120);
+    while std::fs::read_dir(&trainings).map_or(0, Iterator::count) < 3 {
+        assert!(std::time::Instant::now() < until);
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // Not to be caught.
+    child.kill().unwrap();
+    child.wait().unwrap();
+    for folder in [killed.path(), whole.path()] {
+        let out = folder.to_str().unwrap();
+        let output = run(&[&["reproduce", "--out", out, "--epochs", "2"][..], &words].concat());
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    }
+    for file in ["fig6.csv", "fig6.svg"] {
+        let of = |folder: &Path| std::fs::read(folder.join(file)).unwrap();
+        assert!(of(killed.path()) == of(whole.path()), "{file}");
+    }
 }
 
 #[test]

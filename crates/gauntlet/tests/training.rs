@@ -186,3 +186,39 @@ fn a_hand_s_own_training_file_is_not_held_out() {
     assert!(support::text(&output.stderr).contains("not held out"));
     assert_eq!(json(&output)["held_out"], false);
 }
+
+#[test]
+fn a_joint_that_rests_is_warned_of_by_its_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let text = std::fs::read_to_string(&poses).unwrap();
+    let resting: Vec<String> = (text.lines().enumerate())
+        .map(|(row, line)| {
+            let mut fields: Vec<&str> = line.split(',').collect();
+            if row > 0 {
+                fields[1 + 4] = "0.25";
+            }
+            fields.join(",")
+        })
+        .collect();
+    std::fs::write(&poses, resting.join("\n")).unwrap();
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let words = [
+        "train",
+        "--poses",
+        poses,
+        "--out",
+        out,
+        "--schedule",
+        "fast",
+    ];
+    let more = ["--epochs", "5", "--pairs", "heuristic:2", "--json"];
+    let said = json(&run(&[&words[..], &more].concat()));
+    assert_eq!(said["pairs"], 2);
+    let warned = said["warnings"].to_string();
+    assert!(
+        warned.contains(&format!("{} is 0.25", support::JOINTS[4])),
+        "{warned}"
+    );
+}

@@ -17,8 +17,8 @@ use crate::failure::{Failure, told};
 
 /// Pairs where nothing else is said (§3.2.3).
 const PAIRS: usize = 4;
-/// How far a pair may lie outside the samples' range, as a share of it.
-const MARGIN: f32 = 0.1;
+/// How far a pair may lie outside the samples' range, as a share of it: pairs of the outline lie outside the samples of the inside.
+const MARGIN: f32 = 0.2;
 
 /// What to train on.
 #[derive(Debug, Clone, Copy)]
@@ -108,16 +108,17 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
     let input = Samples::read(request.input, "q")?;
     let target = Samples::read(request.target, "x")?;
     refuse_one_point(&target)?;
-    if !request.force {
-        input.check()?;
-        target.check()?;
-    }
     let read_pairs = |file: Option<&Path>| {
         file.map(|file| pairs_of(file, &input, &target, request.force))
             .transpose()
     };
     let truth = read_pairs(request.truth)?;
     let reference = read_pairs(request.pairs_file)?;
+    // After the pairs: another number of columns is the greater mistake.
+    if !request.force {
+        input.check()?;
+        target.check()?;
+    }
     let parts = split(input.values.rows, 1.0 - request.hold_out, request.seed);
     let training = input.values.select(&parts.train);
     let enough = parts.test.len() > NEIGHBOURS;
@@ -153,6 +154,7 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
         pairs,
         operator,
         lambda: Lambda::SHAPES,
+        names: &[],
         pairs_from,
         measured_on: if enough {
             format!("held-out rows of {}", request.input.display())
@@ -259,10 +261,7 @@ fn plan(
     let kind = match (request.pairs, &reference, truth) {
         (Some(choice), ..) => choice.kind,
         (None, None, Some(_)) => PairKind::Adaptive,
-        (None, Some(_), _) => {
-            let fixed = PairPlan::Fixed(reference.unwrap_or_default());
-            return Ok((fixed, "of the file, all there from the start".to_owned()));
-        }
+        (None, Some(_), _) => PairKind::Fixed,
         (None, None, None) => {
             return usage(
                 "there are no reference pairs: without any the map is arbitrary",
@@ -271,6 +270,20 @@ fn plan(
         }
     };
     match (kind, truth) {
+        (PairKind::Fixed, _) => match reference {
+            Some(file) => {
+                let fixed = first(file, request.pairs.and_then(|c| c.count))?;
+                let text = "of the file, all there from the start".to_owned();
+                Ok((PairPlan::Fixed(fixed), text))
+            }
+            None => usage(
+                "--pairs fixed takes those of a file",
+                "--pairs-file PAIRS.csv",
+            ),
+        },
+        (PairKind::Adaptive, Some(truth)) if truth.inputs.rows < count => {
+            Err(too_few("true", truth.inputs.rows, count))
+        }
         (PairKind::Adaptive, Some(_)) => Ok((
             PairPlan::Adaptive {
                 start: reference.unwrap_or_default(),
@@ -298,13 +311,7 @@ fn plan(
                 PairPlan::Fixed(ring.spaced(count)),
                 "of the ring of matched points, at equal distances".to_owned(),
             )),
-            Some(ring) => usage(
-                &format!(
-                    "the ring has {} pairs, {count} are asked for",
-                    ring.inputs.rows
-                ),
-                "a longer ring in --pairs-file, or fewer pairs",
-            ),
+            Some(ring) => Err(too_few("matched", ring.inputs.rows, count)),
             None => usage(
                 "--pairs boundary needs the ring of matched points of both outlines",
                 "--pairs-file RING.csv",
@@ -317,12 +324,26 @@ fn plan(
     }
 }
 
+/// The first `count` pairs of a file, or all.
+pub(crate) fn first(file: Pairs, count: Option<usize>) -> Result<Pairs> {
+    let rows = file.inputs.rows;
+    match count {
+        None => Ok(file),
+        Some(count) if count > rows => Err(too_few("reference", rows, count)),
+        Some(count) => Ok(select(&file, &(0..count).collect::<Vec<_>>())),
+    }
+}
+
+fn too_few(kind: &str, found: usize, wanted: usize) -> anyhow::Error {
+    let what = format!("{found} {kind} pairs, {wanted} are asked for");
+    Failure::usage(what, format!("more {kind} pairs, or fewer --pairs")).into()
+}
+
 /// The first `count` true pairs in the order of the training samples, which is random; where the true pairs are of other samples, of a
 /// random order of their own.
 fn at_random(truth: &Pairs, training: &Matrix, count: usize, seed: u64) -> Result<Pairs> {
     if truth.inputs.rows < count {
-        let what = format!("{} true pairs, {count} are asked for", truth.inputs.rows);
-        return Err(Failure::usage(what, "more true pairs, or fewer --pairs").into());
+        return Err(too_few("true", truth.inputs.rows, count));
     }
     let rows: HashMap<Vec<u32>, usize> = (truth.inputs.iter_rows().enumerate())
         .map(|(row, values)| (values.iter().map(|v| v.to_bits()).collect(), row))

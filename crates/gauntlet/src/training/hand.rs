@@ -14,6 +14,7 @@ use trainer::model::{Model, Normalisation};
 use trainer::operator::{Operator, Scripted, start_pairs};
 use trainer::table3;
 
+use super::domains::first;
 use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};
 use crate::commands::train::{PairChoice, PairKind};
 use crate::failure::{Failure, told};
@@ -158,6 +159,7 @@ pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -
         pairs,
         operator: Box::new(operator),
         lambda: Lambda::HAND,
+        names: &JOINT_NAMES,
         pairs_from,
         measured_on: format!("{share} of {source}"),
     })
@@ -176,13 +178,19 @@ fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPla
     let count = |choice: Option<PairChoice>| choice.and_then(|c| c.count).unwrap_or(PAIRS);
     let kind = match (wanted.choice, wanted.file) {
         (Some(choice), _) => choice.kind,
-        (None, Some(file)) => {
-            let text = format!("of {}, all there from the start", file.display());
-            return Ok((PairPlan::Fixed(from_file(file)?), text));
-        }
+        (None, Some(_)) => PairKind::Fixed,
         (None, None) => PairKind::Adaptive,
     };
     match kind {
+        PairKind::Fixed => {
+            let Some(file) = wanted.file else {
+                let what = "--pairs fixed takes those of a file";
+                return Err(Failure::usage(what, "--pairs-file PAIRS.csv").into());
+            };
+            let count = wanted.choice.and_then(|choice| choice.count);
+            let text = format!("of {}, all there from the start", file.display());
+            Ok((PairPlan::Fixed(first(from_file(file)?, count)?), text))
+        }
         PairKind::Adaptive => {
             let start = match wanted.file {
                 Some(file) => from_file(file)?,

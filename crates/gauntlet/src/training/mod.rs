@@ -2,15 +2,14 @@
 
 pub mod domains;
 pub mod hand;
+mod told;
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use trainer::algorithm::{
-    Error, InUnits, PairPlan, Plan, Progress as Step, Schedule, Settings, Trained, Trainer,
-};
+use trainer::algorithm::{Error, InUnits, PairPlan, Plan, Schedule, Settings, Trained, Trainer};
 use trainer::cost::{Cost, Lambda};
 use trainer::data::{Matrix, Pairs, sha256};
 use trainer::measures::Coverage;
@@ -24,6 +23,7 @@ use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::quality::Measured;
+use told::Told;
 
 /// Share of the frames that train; the rest measure (381 + 254 of the paper's 635).
 const TRAINING_SHARE: f64 = 0.6;
@@ -52,6 +52,8 @@ pub struct Task {
     operator: Box<dyn Operator>,
     /// The factors of the cost where nothing else is said.
     lambda: Lambda,
+    /// Names of the input's columns where it has better ones than numbers.
+    names: &'static [&'static str],
     /// In words: who answers for adaptive pairs, where others come from.
     pairs_from: String,
     /// In words: what the result is measured on.
@@ -346,18 +348,24 @@ pub fn learn(task: &mut Task, course: &Course, interrupt: &Interrupt) -> Result<
         target: &units.x,
     };
     let total = trainer.total();
-    let mut progress = Progress::start("training", total as u64, course.quiet);
-    let mut warnings = Vec::new();
+    let mut told_so_far = Told {
+        progress: Progress::start("training", total as u64, course.quiet),
+        warnings: Vec::new(),
+        names: task.names,
+    };
     loop {
         let (ended, pause) = slice(
             &mut trainer,
             &mut operator,
             course,
             interrupt,
-            (&mut progress, &mut warnings),
+            &mut told_so_far,
         );
         match (ended, pause) {
             (Ok(trained), _) => {
+                let Told {
+                    progress, warnings, ..
+                } = told_so_far;
                 let took = progress.finish();
                 return Ok(Ended::Trained(Box::new(Learned {
                     trained,
@@ -397,12 +405,12 @@ fn slice(
     operator: &mut dyn Operator,
     course: &Course,
     interrupt: &Interrupt,
-    (progress, warnings): (&mut Progress, &mut Vec<String>),
+    told_so_far: &mut Told,
 ) -> (std::result::Result<Trained, Error>, Pause) {
     let started = Instant::now();
     let mut pause = Pause::Interrupt;
     let result = trainer.run(operator, &mut |step| {
-        show(step, progress, warnings);
+        told_so_far.show(step);
         let is_done = step.epoch == step.total;
         if interrupt.asked() {
             pause = Pause::Interrupt;
@@ -443,27 +451,4 @@ fn broken_off(course: &Course, epoch: usize) -> anyhow::Error {
         ))
         .into(),
     }
-}
-
-fn show(step: &Step<'_>, progress: &mut Progress, warnings: &mut Vec<String>) {
-    if let Some(warning) = &step.warning {
-        let text = warning.to_string();
-        // A training that pauses looks at its end again.
-        if !warnings.contains(&text) {
-            progress.say(&format!("warning: {text}"));
-            warnings.push(text);
-        }
-    }
-    progress.at_with(step.epoch as u64, Some(step.remaining), || {
-        format!(
-            "{} pairs, cost {:.4}{}",
-            step.pairs.inputs.rows,
-            step.cost,
-            if step.weights.attraction > 0.0 {
-                ", spreading"
-            } else {
-                ""
-            }
-        )
-    });
 }

@@ -272,7 +272,8 @@ fn outside(what: &'static str, pairs: &Matrix, samples: &Matrix, warnings: &mut 
     let ranges = samples.ranges();
     for (pair, row) in pairs.iter_rows().enumerate() {
         for (column, (&value, &(low, high))) in row.iter().zip(&ranges).enumerate() {
-            let margin = 0.1 * (high - low);
+            // As wide as points of the outline lie outside the samples of the inside.
+            let margin = 0.2 * (high - low);
             if value < low - margin || value > high + margin {
                 warnings.push(Warning::PairOutside {
                     pair: pair + 1,

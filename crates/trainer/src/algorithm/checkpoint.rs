@@ -33,7 +33,7 @@ pub enum Error {
     },
     /// Of other samples.
     #[error(
-        "the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected}); use the samples it was made with"
+        "the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected}); use the samples it was made with, with the same seed and share held out"
     )]
     OtherData {
         /// First digits in the file.

@@ -119,12 +119,24 @@ impl Bench<'_> {
         Ok(self.wrote(what, &files, json!(known)))
     }
 
-    /// Figure 3.
+    /// Figure 3, as many trainings side by side as elsewhere.
     fn sessions(&self, what: What) -> Result<Value> {
+        let (from, work) = ((&self.laboratory, &self.store), &self.work);
         let mut rows = Vec::new();
-        for cell in self.frame.snapshots() {
-            let row = snapshots((&self.laboratory, &self.store), &cell, &self.work);
-            rows.push(row.map_err(|error| self.work.failed(error))?);
+        for cells in self.frame.snapshots().chunks(work.threads()) {
+            let done: Vec<_> = std::thread::scope(|scope| {
+                let running: Vec<_> = (cells.iter())
+                    .map(|cell| scope.spawn(move || snapshots(from, cell, work)))
+                    .collect();
+                let joined = running.into_iter().map(|thread| {
+                    let done = thread.join();
+                    done.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+                });
+                joined.collect()
+            });
+            for row in done {
+                rows.push(row.map_err(|error| work.failed(error))?);
+            }
         }
         self.panels(what, &rows, Value::Null)
     }

@@ -73,6 +73,11 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// Trainings side by side, at least one.
+    pub fn threads(&self) -> usize {
+        self.threads.max(1)
+    }
+
     /// In a few words.
     pub fn describe(&self) -> String {
         format!(

@@ -53,7 +53,8 @@ pub struct Train {
     pub force: bool,
 
     /// Reference pairs: L or adaptive:L (chosen one after another where they help most), random:L (of the true pairs),
-    /// table3:L (the paper's gripper poses, hands only), boundary:L (of the ring in --pairs-file, at equal distances).
+    /// fixed:L (the first L of --pairs-file; fixed: all), table3:L (the paper's gripper poses, hands only; also called
+    /// heuristic:L), boundary:L (of the ring in --pairs-file, at equal distances).
     /// 8 adaptive ones for hands, 4 for other domains.
     #[arg(long, value_name = "L|KIND[:L]", value_parser = PairChoice::parse)]
     pub pairs: Option<PairChoice>,
@@ -171,6 +172,8 @@ pub struct PairChoice {
 pub enum PairKind {
     /// Chosen one after another, at the target that is farthest from what is reached.
     Adaptive,
+    /// Those of a file.
+    Fixed,
     /// Of the true pairs.
     Random,
     /// The paper's gripper poses.
@@ -192,11 +195,12 @@ impl PairChoice {
         let kind = match word {
             "adaptive" => PairKind::Adaptive,
             "random" => PairKind::Random,
-            "table3" => PairKind::Table3,
+            "fixed" => PairKind::Fixed,
+            "table3" | "heuristic" => PairKind::Table3,
             "boundary" => PairKind::Boundary,
             _ => {
                 return Err(format!(
-                    "{word} is no kind of pairs: adaptive, random, table3 or boundary"
+                    "{word} is no kind of pairs: adaptive, random, fixed, table3 (or heuristic) or boundary"
                 ));
             }
         };
@@ -270,7 +274,21 @@ mod tests {
             choice(PairKind::Random, Some(5))
         );
         assert_eq!(PairChoice::parse("table3"), choice(PairKind::Table3, None));
-        for wrong in ["0", "101", "table3:11", "some", "random:", "-1", "8:8"] {
+        assert_eq!(
+            PairChoice::parse("heuristic:8"),
+            choice(PairKind::Table3, Some(8))
+        );
+        assert_eq!(PairChoice::parse("fixed"), choice(PairKind::Fixed, None));
+        for wrong in [
+            "0",
+            "101",
+            "table3:11",
+            "heuristic:11",
+            "some",
+            "random:",
+            "-1",
+            "8:8",
+        ] {
             assert!(PairChoice::parse(wrong).is_err(), "{wrong}");
         }
     }
