@@ -97,7 +97,7 @@ fn the_shapes_files_train_as_any_two_domains() {
     ]));
     assert_eq!(said["quality"]["samples"], 476);
     assert_eq!(said["quality"]["true_pairs"], 476);
-    // The matched outlines lie outside the nodes, most on SP2, and train all the same.
+    // The matched outlines lie outside the nodes, most on SP1, and train all the same.
     for shape in ["sp1", "sp2", "sp3", "sp4"] {
         let part = |part: &str| file(&format!("{shape}-{part}.csv"));
         let words = [

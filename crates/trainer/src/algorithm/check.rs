@@ -273,7 +273,7 @@ fn outside(what: &'static str, pairs: &Matrix, samples: &Matrix, warnings: &mut 
     for (pair, row) in pairs.iter_rows().enumerate() {
         for (column, (&value, &(low, high))) in row.iter().zip(&ranges).enumerate() {
             // As wide as points of the outline lie outside the samples of the inside.
-            let margin = 0.2 * (high - low);
+            let margin = 0.5 * (high - low);
             if value < low - margin || value > high + margin {
                 warnings.push(Warning::PairOutside {
                     pair: pair + 1,

@@ -36,7 +36,7 @@ const FRONT: View = View {
 };
 
 /// Millimetres shown: across, and up from here, in the same scale.
-const ACROSS: (f32, f32) = (-88.0, 116.0);
+const ACROSS: (f32, f32) = (-93.0, 121.0);
 const LOWEST: f32 = -22.0;
 
 /// First joint of each digit in the hand's frame (x to the thumb, y to the back, z to the fingertips), and lengths of its bones, mm.
