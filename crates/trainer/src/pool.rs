@@ -15,6 +15,8 @@ const SPINS: u32 = 4000;
 pub(crate) struct Pool {
     shared: Arc<Shared>,
     helpers: Vec<JoinHandle<()>>,
+    /// Whether the caller works without the helpers for now.
+    alone: bool,
 }
 
 struct Shared {
@@ -116,12 +118,21 @@ impl Pool {
             builder.spawn(move || help(&shared, thread)).ok()
         };
         let helpers = (1..threads).filter_map(spawn).collect();
-        Self { shared, helpers }
+        Self {
+            shared,
+            helpers,
+            alone: false,
+        }
+    }
+
+    /// Leaves the helpers out from now on, or takes them in again.
+    pub(crate) fn set_alone(&mut self, alone: bool) {
+        self.alone = alone;
     }
 
     /// Calls `work` once for each item, on whichever thread is free.
     pub(crate) fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Sync) {
-        if self.helpers.is_empty() || items.len() < 2 {
+        if self.alone || self.helpers.is_empty() || items.len() < 2 {
             return items.iter_mut().for_each(work);
         }
         let count = items.len();

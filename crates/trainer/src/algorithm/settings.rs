@@ -129,23 +129,9 @@ impl Schedule {
         self.plan_for(4)
     }
 
-    /// Its numbers for a target of so many dimensions. A few hundred poses resolve a target of four dimensions only coarsely, so that
-    /// fewer epochs do there. What was tried: docs/measurements/trainer.md.
+    /// Its numbers for a target of so many dimensions. What was tried: docs/measurements/trainer.md.
     #[must_use]
     pub fn plan_for(&self, target_dimensions: usize) -> Plan {
-        let fast = Plan {
-            stage_epochs: 200,
-            stage_rate: 2.0,
-            last_epochs: 6000,
-            rate: LearningRate {
-                initial: 7e-4,
-                ..LearningRate::PAPER
-            },
-            ramp_start: 1000,
-            ramp_epochs: 1500,
-            cooling_epochs: 1500,
-            batches: 4,
-        };
         match *self {
             Self::Paper => Plan {
                 stage_epochs: 100,
@@ -157,28 +143,55 @@ impl Schedule {
                 cooling_epochs: 0,
                 stage_rate: 1.0,
             },
-            Self::Fast if target_dimensions < 4 => fast,
-            // The whole cloud in every step: of a quarter of it the nearest target is too far away in four dimensions, and that
-            // makes the map steeper.
-            Self::Fast => Plan {
-                stage_epochs: 100,
-                stage_rate: 4.0 / 3.0,
-                last_epochs: 2000,
-                rate: LearningRate {
-                    initial: 1.5e-3,
-                    ..LearningRate::PAPER
-                },
-                ramp_start: 600,
-                ramp_epochs: 500,
-                cooling_epochs: 500,
-                batches: 1,
-            },
+            Self::Fast => Plan::fast(target_dimensions),
             Self::Custom(plan) => plan,
         }
     }
 }
 
 impl Plan {
+    /// [`Schedule::Fast`] on planes, on surfaces in space, and with four dimensions or more, as a hand's targets.
+    fn fast(target_dimensions: usize) -> Self {
+        let rate = |initial| LearningRate {
+            initial,
+            ..LearningRate::PAPER
+        };
+        match target_dimensions {
+            0..=2 => Self {
+                stage_epochs: 300,
+                stage_rate: 1.0,
+                last_epochs: 3000,
+                rate: rate(2e-3),
+                ramp_start: 800,
+                ramp_epochs: 500,
+                cooling_epochs: 1000,
+                batches: 4,
+            },
+            3 => Self {
+                stage_epochs: 200,
+                stage_rate: 2.0,
+                last_epochs: 6000,
+                rate: rate(7e-4),
+                ramp_start: 1000,
+                ramp_epochs: 1500,
+                cooling_epochs: 1500,
+                batches: 4,
+            },
+            // The whole cloud in every step: of a quarter of it the nearest target is too far away in four dimensions, and
+            // that makes the map steeper.
+            _ => Self {
+                stage_epochs: 100,
+                stage_rate: 4.0 / 3.0,
+                last_epochs: 2000,
+                rate: rate(1.5e-3),
+                ramp_start: 600,
+                ramp_epochs: 500,
+                cooling_epochs: 500,
+                batches: 1,
+            },
+        }
+    }
+
     /// The optimiser's rate of an epoch; the last stage has `last_epochs`, so many epochs come before it.
     pub(super) fn rate_at(&self, epoch: usize, before: usize) -> LearningRate {
         let factor = if epoch < before {

@@ -5,6 +5,7 @@
 
 mod chamfer;
 mod cloud;
+mod pace;
 mod phases;
 #[cfg(test)]
 mod tests;
@@ -19,6 +20,7 @@ use crate::optimizer::{LearningRate, Nadam};
 use crate::pool::Pool;
 use cloud::{Cloud, PairPart, QPart, UnitPart, Ways, XPart, ranges};
 use core::time::Duration;
+use pace::Pace;
 use std::time::Instant;
 
 /// Parts of each cloud of samples, and the blocks from which on a part is cut in two.
@@ -39,6 +41,8 @@ pub(crate) const PHASES: [&str; 6] = [
 pub(crate) struct Engine {
     machine: Machine,
     pool: Pool,
+    /// Of steps without attraction, and with it.
+    pace: [Pace; 2],
     /// The shapes of f and g.
     f: Shape,
     g: Shape,
@@ -94,6 +98,7 @@ impl Engine {
         Self {
             machine: Machine::best(),
             pool: Pool::new(threads),
+            pace: Default::default(),
             nadam: Nadam::new(parameters.len()),
             parameters,
             gradient: vec![0.0; f.len() + g.len()],
@@ -155,9 +160,14 @@ impl Engine {
         fits
     }
 
-    /// One step on one batch of targets; the parts of the cost are those before the step.
+    /// One step on one batch of targets; the parts of the cost are those before the step. With or without the helper threads, whichever
+    /// is faster: the result is the same.
     pub(crate) fn step(&mut self, weights: &Weights, batch: usize, rate: &LearningRate) -> Parts {
+        let begin = Instant::now();
+        let kind = usize::from(weights.attraction != 0.0);
+        self.pool.set_alone(self.pace[kind].is_alone());
         let parts = self.gradients(weights, batch);
+        self.pace[kind].done(begin.elapsed());
         let start = Instant::now();
         let factors = self.nadam.begin(rate);
         nadam::step(

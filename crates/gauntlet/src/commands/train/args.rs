@@ -13,7 +13,7 @@ use trainer::measures::Coverage;
     after_help = "\
 Examples:
   gauntlet train --poses my_hand.csv --out model.safetensors
-  gauntlet train --poses my_hand.csv --out model.safetensors --schedule fast --seed 7
+  gauntlet train --poses my_hand.csv --out model.safetensors --schedule paper --seed 7
   gauntlet train --poses my_hand.csv --out model.safetensors --pairs table3:8
   gauntlet train --input Q.csv --target X.csv --truth PAIRS.csv --volume 9 --dim 2 --out map.safetensors
   gauntlet train --input Q.csv --target X.csv --pairs-file PAIRS.csv --cost hae --alpha 0 --out map.safetensors
@@ -75,7 +75,7 @@ pub struct Train {
     #[arg(long, value_name = "L1,L2,L3", value_parser = lambda)]
     pub lambda: Option<[f64; 3]>,
     /// How long to train.
-    #[arg(long, value_enum, default_value_t = Schedule::Paper)]
+    #[arg(long, value_enum, default_value_t = Schedule::Fast)]
     pub schedule: Schedule,
     /// Epochs of the last stage, instead of the schedule's (1 to 1000000).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1_000_000))]
@@ -142,7 +142,7 @@ impl CoverageArgs {
 /// How long to train.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Schedule {
-    /// Seconds to a minute, with a greater learning rate and a quarter of the targets a step.
+    /// Seconds: fewer epochs at a greater learning rate, as good a map (docs/measurements/trainer.md).
     #[value(alias = "short")]
     Fast,
     /// The paper's 8,000 + 100 L epochs.
