@@ -181,7 +181,7 @@ impl Plan {
             // that makes the map steeper.
             _ => Self {
                 stage_epochs: 100,
-                stage_rate: 4.0 / 3.0,
+                stage_rate: 1.33,
                 last_epochs: 2000,
                 rate: rate(1.5e-3),
                 ramp_start: 600,
