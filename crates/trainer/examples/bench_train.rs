@@ -1,8 +1,10 @@
 //! Measures training: time a step and a model, quality by data set and schedule.
 //!
 //! `cargo run --release -p trainer --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
-//! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or
-//! `M2,rate,ramp start,ramp,batches,decay`. `-- speed 2` prints the table of times a step on two threads, with the phases of a step and
+//! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
+//! differs from the fast one on a plane (`m1`, `m2`, `stage_rate`, `rate`, `decay`, `start`, `ramp`, `cool`, `batches`; see
+//! `trainer::algorithm::Plan`); seeds: `5`, or `6-10`; then threads, and the deviation of initial weights that are normally distributed.
+//! `-- speed 2` prints the table of times a step on two threads, with the phases of a step and
 //! how it grows. Without a word it prints all there is about speed, and draws the growth into `target/bench-train`.
 
 use core::ops::ControlFlow;
@@ -20,7 +22,7 @@ use trainer::figures::{Chart, Curve};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::Normalisation;
 use trainer::motion::Generator;
-use trainer::network::Network;
+use trainer::network::{Initialisation, Network};
 use trainer::operator::{GroundTruth, Operator, Scripted, start_pairs};
 use trainer::shapes::ShapePair;
 
@@ -155,12 +157,13 @@ fn train(
     schedule: Schedule,
     seed: u64,
     threads: usize,
+    normal: Option<f64>,
 ) -> Result<(Measures, [f64; 2])> {
     let mut domain = domain(name, seed)?;
     domain.settings.schedule = schedule;
     domain.settings.threads = threads;
-    if let Ok(dev) = std::env::var("NORMAL") {
-        domain.settings.initialisation = trainer::network::Initialisation::Normal(dev.parse()?);
+    if let Some(deviation) = normal {
+        domain.settings.initialisation = Initialisation::Normal(deviation);
     }
     let (start, before) = (Instant::now(), processor_seconds());
     let mut trainer = Trainer::new(&domain.train, &domain.targets, &domain.settings)?;
@@ -202,11 +205,17 @@ fn seeds(word: &str) -> Result<RangeInclusive<u64>> {
     Ok(first.parse()?..=last.parse()?)
 }
 
-fn quality(name: &str, word: &str, seeds: RangeInclusive<u64>, threads: usize) -> Result<()> {
+fn quality(
+    name: &str,
+    word: &str,
+    seeds: RangeInclusive<u64>,
+    threads: usize,
+    normal: Option<f64>,
+) -> Result<()> {
     let schedule = schedule(word)?;
     let mut rows: [Vec<f64>; 6] = Default::default();
     for seed in seeds {
-        let (m, [wall, processor]) = train(name, schedule, seed, threads)?;
+        let (m, [wall, processor]) = train(name, schedule, seed, threads, normal)?;
         let values = [
             m.distortion,
             m.occupancy.unwrap_or(f64::NAN),
@@ -412,7 +421,7 @@ fn everything(folder: &Path) -> Result<()> {
     for threads in [1, 2] {
         for (schedule, word) in [(Schedule::Fast, "fast"), (Schedule::Paper, "paper")] {
             for name in ["sp1", "hand"] {
-                let (_, [wall, processor]) = train(name, schedule, 1, threads)?;
+                let (_, [wall, processor]) = train(name, schedule, 1, threads, None)?;
                 let memory = peak_memory().unwrap_or(f64::NAN);
                 println!(
                     "| {name}, {word} | {threads} | {wall:.2} | {processor:.2} | {memory:.0} |"
@@ -451,6 +460,7 @@ fn main() -> Result<()> {
             word(2, "fast"),
             seeds(word(3, "5"))?,
             word(4, "2").parse()?,
+            words.get(5).map(|word| word.parse()).transpose()?,
         ),
         "speed" => {
             speed(word(1, "1").parse()?);
