@@ -380,3 +380,39 @@ fn one_of_the_others_that_answers_eight_registers_is_found_out_once_it_is_ready(
     }
     assert_eq!((slave.writes, told), (0, 50));
 }
+
+#[test]
+fn a_three_finger_gripper_that_sets_a_reserved_bit_is_one_all_the_same() {
+    // At rest, so that only its axes tell; the bit stands where the others have the controller's fault.
+    let odd = || {
+        let mut slave = Slave::three_finger();
+        (slave.status[0], slave.status[1], slave.status[2]) = (0x31, 0, 0x10);
+        slave
+    };
+    let (writes, error) = written(
+        |slave, request| {
+            let known = asked(request).0 != function::READ_INPUT;
+            known.then(|| slave.answer(request))
+        },
+        odd(),
+    );
+    assert_eq!(writes, 0);
+    assert_eq!(error, Some(Error::OtherGripper(Kind::ThreeFinger)));
+    // Its own driver, told of such firmware, works with it.
+    let (line, mut slave) = (Line::default(), odd());
+    let config = Config {
+        check_reserved: false,
+        ..Config::default()
+    };
+    let mut gripper = ThreeFinger::new(line.clone(), config);
+    for _ in 0..50 {
+        gripper.set_motion(somewhere(), at(line.now()));
+        run_gripper(
+            &line,
+            &mut gripper,
+            line.now() + 50_000,
+            &mut |line, end, request| slave.serve(line, end, request),
+        );
+    }
+    assert!(slave.writes > 10);
+}

@@ -45,16 +45,17 @@ impl Kind {
     /// in byte 1 and in bits 1 and 2 of byte 0, the 3-Finger gripper in the high half of byte 2.
     #[must_use]
     pub fn of_status(block: &[u8; three_finger::BLOCK]) -> Option<Self> {
-        let ready = block[0] & 0x31 == 0x31;
-        let (axes, own_bits) = (&block[6..15], block[0] & 0x06 != 0 || block[1] != 0);
-        if reserved(block, &three_finger::STATUS_RESERVED).is_err() {
-            return (block[15] == 0 && !own_bits).then_some(Self::TwoFinger);
+        let (own_bits, axes) = (block[0] & 0x06 != 0 || block[1] != 0, &block[6..15]);
+        // Neither has that one.
+        if block[15] != 0 {
+            return None;
         }
-        match axes.iter().any(|byte| *byte != 0) {
-            true => Some(Self::ThreeFinger),
-            false if own_bits => Some(Self::ThreeFinger),
-            false => ready.then_some(Self::TwoFinger),
+        // Before byte 2: a 3-Finger gripper that sets a reserved bit there is one all the same.
+        if own_bits || axes.iter().any(|byte| *byte != 0) {
+            return Some(Self::ThreeFinger);
         }
+        let (ready, controller_fault) = (block[0] & 0x31 == 0x31, block[2] & 0xF0 != 0);
+        (ready || controller_fault).then_some(Self::TwoFinger)
     }
 }
 
@@ -153,6 +154,12 @@ mod tests {
         // Reset, but its axes stand somewhere; ready in every golden reply.
         block = [0, 0, 0, 0, 7, 0, 0, 6, 0, 0, 6, 0, 0, 137, 0, 0];
         assert_eq!(Kind::of_status(&block), Some(Kind::ThreeFinger));
+        block[2] = 0x10;
+        assert_eq!(
+            Kind::of_status(&block),
+            Some(Kind::ThreeFinger),
+            "a reserved bit, and axes"
+        );
         block[15] = 1;
         assert_eq!(Kind::of_status(&block), None, "neither has that");
         block = [0; three_finger::BLOCK];
