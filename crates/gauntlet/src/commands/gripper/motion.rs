@@ -182,7 +182,7 @@ fn approach<B: Bench<X>, const X: usize>(
     let waiter = doing.waiter.clone();
     let (mut calm, mut heard_at) = (0, Instant::now());
     let mut command = next_command(target, newest, axes);
-    let mut limited = Limited::new(newest);
+    let mut limited = Limited::new(newest, &command);
     waiter.pump(&mut doing.driver, MOVE_WAIT, |driver, now, heard| {
         if let Some(Ok(status)) = heard {
             (*newest, heard_at) = (status, Instant::now());
@@ -219,29 +219,33 @@ fn approach<B: Bench<X>, const X: usize>(
 /// For how many statuses in a row each axis has stood short of what it was told, saying that it is there.
 struct Limited<const X: usize> {
     position: [u8; X],
+    told: [u8; X],
     calm: [u32; X],
 }
 
 impl<const X: usize> Limited<X> {
-    fn new(status: &Status<X>) -> Self {
+    fn new(status: &Status<X>, command: &[u8; X]) -> Self {
         Self {
             position: status.position,
+            told: *command,
             calm: [0; X],
         }
     }
 
-    /// `accepted`: the gripper repeats this command; before that its contacts speak of an earlier one.
+    /// `accepted`: the gripper repeats this command; before that its contacts speak of an earlier one. An axis told
+    /// something else has its time to start again: it may have waited for the scissor until now.
     fn note(&mut self, status: &Status<X>, command: &[u8; X], accepted: bool) {
         for (axis, told) in command.iter().enumerate() {
             let here = status.position[axis];
             let short = status.contact[axis] == Contact::AtPosition
                 && here != *told
-                && here == self.position[axis];
+                && here == self.position[axis]
+                && *told == self.told[axis];
             self.calm[axis] = match accepted && short {
                 true => self.calm[axis].saturating_add(1),
                 false => 0,
             };
-            self.position[axis] = here;
+            (self.position[axis], self.told[axis]) = (here, *told);
         }
     }
 
@@ -401,13 +405,19 @@ mod tests {
 
     #[test]
     fn an_axis_that_says_it_is_there_and_is_not_is_at_its_limit_only_after_a_while() {
-        let mut limited = Limited::new(&status([150]));
+        let mut limited = Limited::new(&status([150]), &[190]);
         for _ in 1..LIMIT_CALM {
             limited.note(&status([150]), &[190], true);
         }
         assert!(!limited.is_at_limit(0));
         limited.note(&status([150]), &[190], true);
         assert!(limited.is_at_limit(0));
+        // It stood a count short while the scissor was in its way, and may go on only now.
+        let mut waiting = Limited::new(&status([150]), &[151]);
+        (0..=LIMIT_CALM).for_each(|_| waiting.note(&status([150]), &[151], true));
+        assert!(waiting.is_at_limit(0));
+        waiting.note(&status([150]), &[190], true);
+        assert!(!waiting.is_at_limit(0));
         // Not accepted, on its way, touching something, or where it was told to be: no limit.
         let mut moving = status([150]);
         moving.contact = [Contact::Moving];
