@@ -381,6 +381,17 @@ fn another_family_than_the_one_named_is_refused_before_anything_is_written() {
 }
 
 #[test]
+fn a_person_can_vouch_for_the_family() {
+    // Eight registers that do not end in zeros, as no 2-Finger gripper's manual has them.
+    let (gripper, _handle, path) = gripper(Config::default());
+    gripper.preset_active();
+    let verb = ["status", "--json", "--model", "2f85"];
+    refusal(&bench(&verb, &path), 1);
+    let vouched = json(&bench(&[&verb[..], &["--trust-model"]].concat(), &path));
+    assert_eq!(vouched["activation"], "ready", "{vouched}");
+}
+
+#[test]
 fn ctrl_c_ends_every_verb_while_nobody_answers() {
     let verbs: [&[&str]; 7] = [
         &["status"],

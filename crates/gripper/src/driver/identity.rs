@@ -94,7 +94,8 @@ impl Identity {
     pub(super) fn near_answer(&mut self, code: u8) {
         let (with_input, with_holding) = SILENT;
         if code == function::READ_INPUT {
-            self.known |= self.zeros || self.silent >= with_input;
+            let silent = self.silent >= with_input && !self.foreign;
+            self.known |= self.zeros || silent;
         } else if self.silent > self.near && !self.foreign {
             self.near += 1;
             self.known |= self.near >= with_holding;

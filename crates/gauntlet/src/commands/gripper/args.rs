@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use gripper::registers::{three_finger, two_finger};
 
-use crate::line::Settings;
+use crate::line::{Line, Settings};
 
 /// Options of `gripper`.
 #[derive(Debug, Args)]
@@ -91,6 +91,10 @@ pub struct Target {
     /// Which gripper it is.
     #[arg(long, value_enum, default_value_t = Model::ThreeFinger)]
     pub model: Model,
+    /// Take it for a --model even if it answers as one of another family: only for a gripper whose firmware answers what
+    /// its manual does not name. A command for another family moves the fingers elsewhere.
+    #[arg(long)]
+    pub trust_model: bool,
     /// Its Modbus unit (slave id), if not 9 on a serial line or 2 over TCP.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=247))]
     pub unit: Option<u8>,
@@ -111,10 +115,20 @@ impl Target {
         Self {
             gripper: place.to_owned(),
             model,
+            trust_model: false,
             unit: None,
             baud: None,
             raw: false,
             json: false,
+        }
+    }
+
+    /// How to set up a driver for it on `line`.
+    pub fn driver_config(&self, line: &Line) -> gripper::driver::Config {
+        let config = line.driver_config(self.settings());
+        gripper::driver::Config {
+            check_family: config.check_family && !self.trust_model,
+            ..config
         }
     }
 

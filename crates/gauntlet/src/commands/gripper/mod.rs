@@ -51,7 +51,7 @@ pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
         return Err(only_three_finger_on_tcp().into());
     }
     let line = Line::open(&target.gripper, target.settings(), interrupt)?;
-    let config = line.driver_config(target.settings());
+    let config = target.driver_config(&line);
     match target.model.two_finger() {
         None => act(ThreeFinger::new(line, config), config, options, interrupt),
         Some(model) => act(
@@ -78,7 +78,7 @@ pub(super) fn only_three_finger_on_tcp() -> Failure {
 pub(super) fn probe(place: &Path, model: Model, interrupt: &Interrupt) -> Result<()> {
     let target = &Target::delivered(place, model);
     let line = Line::open(place, target.settings(), interrupt)?;
-    let config = line.driver_config(target.settings());
+    let config = target.driver_config(&line);
     let waiter = &Waiter::new(interrupt);
     match model.two_finger() {
         None => {
