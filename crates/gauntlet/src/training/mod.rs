@@ -216,11 +216,11 @@ impl Task {
         match &self.pairs {
             PairPlan::Fixed(_) => format!("{start} reference pairs {}", self.pairs_from),
             PairPlan::Adaptive { count, .. } => {
-                let start = match start {
-                    0 => String::new(),
-                    start => format!("{start} reference pairs to start with and "),
+                let pairs = match start {
+                    0 => format!("{count} reference pairs"),
+                    start => format!("{start} reference pairs to start with and {count}"),
                 };
-                format!("{start}{count} chosen on the way, {}", self.pairs_from)
+                format!("{pairs} chosen on the way, {}", self.pairs_from)
             }
         }
     }
