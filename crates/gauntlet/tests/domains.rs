@@ -65,6 +65,22 @@ fn any_two_domains_train_and_the_four_measures_come_out() {
 }
 
 #[test]
+fn a_map_that_true_pairs_speak_against_is_warned_of() {
+    let files = Files::new();
+    let mut mirrored = pairs().spaced(8);
+    for x in mirrored.targets.data.chunks_exact_mut(2) {
+        x[0] = -x[0];
+    }
+    let mirrored = files.pairs_file("mirrored.csv", &mirrored);
+    let said =
+        json(&files.train_with_truth(&["--pairs-file", &mirrored, "--pairs", "fixed", "--json"]));
+    let nmse = said["quality"]["nmse"].as_f64().unwrap();
+    assert!(nmse > 0.5, "{said}");
+    let warned = said["warnings"].to_string();
+    assert!(warned.contains(&format!("NMSE {nmse:.2}")), "{warned}");
+}
+
+#[test]
 fn what_cannot_be_measured_is_null_with_a_word_why() {
     let files = Files::new();
     let pairs = files.pairs_file("pairs.csv", &pairs().spaced(4));

@@ -147,14 +147,19 @@ impl Pool {
         for (thread, own) in self.shared.left.iter().enumerate() {
             own.fill((count + threads - 1 - thread) / threads);
         }
-        lock(&self.shared.state).job = Some(job);
-        self.shared.generation.fetch_add(1, Ordering::Release);
+        self.shared.panicked.store(false, Ordering::Relaxed);
+        {
+            // Both under the lock: a helper about to sleep sees the new number, or is woken.
+            let mut state = lock(&self.shared.state);
+            state.job = Some(job);
+            self.shared.generation.fetch_add(1, Ordering::Release);
+        }
         self.shared.wake.notify_all();
         let finish = Finish(&self.shared);
         self.shared.take_pieces(job, 0);
         drop(finish);
         assert!(
-            !self.shared.panicked.swap(false, Ordering::Relaxed),
+            !self.shared.panicked.load(Ordering::Relaxed),
             "a training thread panicked"
         );
     }
@@ -268,14 +273,7 @@ mod tests {
         }));
         assert!(result.is_err());
         let mut items = [1_u32; 8];
-        pool.panicked_is_cleared();
         pool.for_each(&mut items, |item| *item += 1);
         assert_eq!(items, [2; 8]);
-    }
-
-    impl Pool {
-        fn panicked_is_cleared(&self) {
-            self.shared.panicked.store(false, Ordering::Relaxed);
-        }
     }
 }

@@ -16,7 +16,7 @@ use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::outputs::Kind;
 use crate::poses::Motion;
-use crate::quality::Quality;
+use crate::quality::{Measured, Quality};
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Course, Ended, Task, domains, hand};
@@ -53,12 +53,16 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     };
     let course = course(options);
     describe(options, &task, &course, &tell);
-    let learned = match crate::training::learn(&mut task, &course, interrupt)? {
+    let mut learned = match crate::training::learn(&mut task, &course, interrupt)? {
         Ended::Trained(learned) => learned,
         Ended::StoppedAt(epoch) => return stopped(options, epoch, &tell),
     };
     let (model, measured) = task.model(&course, &learned, interrupt)?;
     model.save(&options.out).map_err(told)?;
+    if let Some(warning) = far_from_truth(&measured) {
+        out::note(format_args!("warning: {warning}"));
+        learned.warnings.push(warning);
+    }
     let is_hand = options.poses.is_some();
     if options.json {
         let quality = if is_hand {
@@ -87,6 +91,17 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     }
     tell.say(format_args!("model      {}", options.out.display()));
     Ok(())
+}
+
+/// What true pairs say of a map that neighbours alone may not show to be folded: right maps have an NMSE below about .1, folded or
+/// turned ones about 1.
+fn far_from_truth(measured: &Measured) -> Option<String> {
+    const FAR: f64 = 0.5;
+    let nmse = measured.nmse.filter(|nmse| *nmse > FAR)?;
+    Some(format!(
+        "the map folds or is turned: NMSE {nmse:.2} over true pairs (right maps: below 0.1); train with another --seed, \
+         one more of --pairs, or --schedule paper"
+    ))
 }
 
 /// Before minutes of training, not after.
