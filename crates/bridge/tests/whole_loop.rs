@@ -3,7 +3,7 @@
 mod common;
 
 use bridge::event::Kind;
-use bridge::{HoldReason, SafeAction, Settings, State};
+use bridge::{Config, HoldReason, SafeAction, Settings, State};
 use common::FIST;
 use common::bench::{Bench, MS, S};
 
@@ -414,6 +414,47 @@ fn requests_that_need_an_open_clutch_are_refused_while_it_is_closed() {
     assert!(bench.told(Kind::Refused(Request::Activate)));
     assert!(bench.told(Kind::Refused(Request::Calibrate)));
     assert_eq!(bench.state(), State::Following);
+}
+
+#[test]
+fn settings_changed_after_a_release_leave_the_hold_as_it_is() {
+    // A slow gripper: the commands lead it by all that they may.
+    let slow = Settings {
+        speed: [20; 4],
+        ..Settings::default()
+    };
+    let mut settings = slow;
+    settings.force = [200; 4];
+    // At once, when the hold has not left yet, and later.
+    for pause in [0, 1, 2, 20, 2_000] {
+        let mut bench = Bench::new(slow);
+        bench.ready();
+        bench.follow();
+        bench.run(S);
+        bench.set_pose(FIST);
+        let start = bench.gripper.positions()[0];
+        bench.until("half closed", |bench| {
+            bench.gripper.positions()[0] > start + 90.0
+        });
+        bench.release();
+        bench.until("open", |bench| !bench.app.is_engaged());
+        bench.run(pause * MS);
+        let held = bench.gripper.positions();
+        let config = Config::new(settings).expect("in range");
+        assert_eq!(bench.app.set_config(config), Ok(()));
+        bench.run(S);
+        let now = bench.gripper.positions();
+        let moved = held.iter().zip(now).any(|(a, b)| (a - b).abs() > 2.0);
+        assert!(!moved, "{pause} ms after: from {held:?} to {now:?}");
+        let command = bench.app.telemetry().command.expect("the hold");
+        assert_eq!((command.speed, command.force), (slow.speed, slow.force));
+        bench.follow();
+        let command = bench.app.telemetry().command.expect("it follows");
+        assert_eq!(
+            (command.speed, command.force),
+            (settings.speed, settings.force)
+        );
+    }
 }
 
 #[test]

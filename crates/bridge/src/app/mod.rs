@@ -213,7 +213,7 @@ where
         if config.settings().side != self.config().settings().side {
             self.posture = Posture::new(config.settings().side, *self.posture.calibration());
         }
-        self.supervisor = Supervisor::new(config);
+        self.supervisor.configure(config);
         Ok(())
     }
 

@@ -1,7 +1,7 @@
 //! What a state says to the gripper: follow, hold, open, or nothing.
 
 use super::hand::Used;
-use super::{State, Supervisor, limits, seconds, since};
+use super::{Grip, State, Supervisor, limits, seconds, since};
 use crate::config::SafeAction;
 use crate::{Duration, Instant, timing};
 use gripper::registers::{Fault, Severity};
@@ -31,12 +31,12 @@ impl<const X: usize> Supervisor<X> {
         }
         if !obeys(status) {
             self.held = None;
-            self.commanded = false;
+            self.grip = None;
             return (None, now);
         }
         let opening = self.moved && self.config.settings().safe_action == SafeAction::OpenSlowly;
         let motion = match self.state {
-            State::Idle if !self.commanded => None,
+            State::Idle if self.grip.is_none() => None,
             State::SafeAction(_) if opening => Some(self.open(gap, status)),
             _ => self.hold(status),
         };
@@ -140,14 +140,22 @@ impl<const X: usize> Supervisor<X> {
         Some(self.command(held))
     }
 
-    /// A motion to `position` with the configured speed and force, which never change while the clutch is closed.
+    /// A motion to `position` with the configured speed and force. They never change while the clutch is closed, nor in a
+    /// hold: another force could tighten a grip.
     fn command(&mut self, position: [u8; X]) -> Motion<X> {
-        self.commanded = true;
+        let grip = match self.grip {
+            Some(grip) if !self.state.is_moving() => grip,
+            _ => Grip {
+                speed: self.config.settings().speed,
+                force: self.config.settings().force,
+            },
+        };
+        self.grip = Some(grip);
         self.position = position.map(f32::from);
         Motion {
             position,
-            speed: self.config.settings().speed,
-            force: self.config.settings().force,
+            speed: grip.speed,
+            force: grip.force,
         }
     }
 }

@@ -69,14 +69,21 @@ pub struct Supervisor<const X: usize> {
     position: [f32; X],
     /// What a hold repeats, once taken.
     held: Option<[u8; X]>,
-    /// A command has been written since the gripper became ready.
-    commanded: bool,
+    /// Speed and force of the newest command since the gripper became ready.
+    grip: Option<Grip<X>>,
     /// Motion has begun under this clutch.
     moved: bool,
     held_since: Option<Instant>,
     blend: Blend<X>,
     was_ready: bool,
     ignored_since: Option<Instant>,
+}
+
+/// How a command moves.
+#[derive(Debug, Clone, Copy)]
+struct Grip<const X: usize> {
+    speed: [u8; X],
+    force: [u8; X],
 }
 
 /// Where and when following began.
@@ -96,7 +103,7 @@ impl<const X: usize> Supervisor<X> {
             stepped: None,
             position: [0.0; X],
             held: None,
-            commanded: false,
+            grip: None,
             moved: false,
             held_since: None,
             blend: Blend {
@@ -116,6 +123,13 @@ impl<const X: usize> Supervisor<X> {
     /// The configuration.
     pub fn config(&self) -> &Config<X> {
         &self.config
+    }
+
+    /// Takes another configuration, while the clutch is open. What is held stays held, with the speed and force it has; they
+    /// change when motion begins again.
+    pub fn configure(&mut self, config: Config<X>) {
+        self.follower = Follower::new(config.settings().filter);
+        self.config = config;
     }
 
     /// One step. Call it every 10 ms, and whenever a new frame should be answered at once.
