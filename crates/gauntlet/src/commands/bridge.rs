@@ -88,7 +88,9 @@ fn status(at: &BridgeAt) -> Result<()> {
         .iter()
         .for_each(|line| tell.say(format_args!("{line}")));
     if let Some((there, announced)) = status.transfer {
-        tell.say(format_args!("transfer   {there} of {announced} bytes"));
+        tell.say(format_args!(
+            "transfer   {there} of {announced} bytes, not ended: `gauntlet flash` goes on with it, `gauntlet bridge reboot` gives it up"
+        ));
     }
     tell.say(format_args!(
         "counters   {} frames, {} to follow, {} of those answered; {} commands; {} gripper cycles, {} errors; bytes lost {:?} (host, glove, gripper)",

@@ -189,6 +189,12 @@ pub fn refusal_words(refusal: &Refusal) -> (String, String) {
             "opening the clutch first: end the `gauntlet bridge engage` that keeps it closed, or, where its host is gone, `gauntlet bridge release`"
                 .to_owned(),
         ),
+        // The store's own words name requests of the protocol; a person types these.
+        Refusal::Store(bridge::store::Error::Busy) => (
+            "a weights image was begun and did not end".to_owned(),
+            "`gauntlet flash` with the same file, which goes on; or `gauntlet bridge reboot`, which gives the image up"
+                .to_owned(),
+        ),
         Refusal::Store(error) => {
             let text = error.to_string();
             match text.rsplit_once(": ") {

@@ -302,6 +302,12 @@ fn a_refusal_is_told_in_one_line_with_its_next_step() {
 }
 
 #[test]
+fn an_image_that_did_not_end_is_told_with_commands_that_a_person_can_type() {
+    let (_, next) = refusal_words(&Refusal::Store(bridge::store::Error::Busy));
+    assert!(next.contains("`gauntlet flash`") && next.contains("`gauntlet bridge reboot`"));
+}
+
+#[test]
 fn two_hosts_and_every_other_refusal_have_words_and_a_next_step() {
     use bridge::store::Error as Store;
     let refusals = [
