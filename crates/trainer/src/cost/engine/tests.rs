@@ -72,6 +72,19 @@ const SHAPES: [((usize, usize, usize), [usize; 3]); 8] = [
     ((13, 40, 8), [260, 90, 1]),
 ];
 
+/// Those, and three times as many drawn at random.
+fn shapes() -> Vec<((usize, usize, usize), [usize; 3])> {
+    let mut random = Random::new(28, 0);
+    let mut drawn = || {
+        let mut up_to = |most: usize| 1 + random.below(most);
+        let shape = (up_to(30), up_to(70), up_to(12));
+        (shape, [up_to(150), up_to(300), up_to(12)])
+    };
+    let mut all = SHAPES.to_vec();
+    all.extend((0..3 * SHAPES.len()).map(|_| drawn()));
+    all
+}
+
 fn rows(matrix: &Matrix) -> Vec<Vec<f64>> {
     let widen = |row: &[f32]| row.iter().map(|&v| f64::from(v)).collect();
     matrix.iter_rows().map(widen).collect()
@@ -100,7 +113,7 @@ fn gradients_agree_with_the_f64_reference_on_random_shapes() {
         alone(0.0, 0.0, 0.0, 1.0, 0.0),
         alone(0.0, 0.0, 0.0, 1.0, 1.0),
     ];
-    for (seed, (shape, counts)) in SHAPES.into_iter().enumerate() {
+    for (seed, (shape, counts)) in shapes().into_iter().enumerate() {
         let task = task(shape, counts, seed as u64);
         let networks = Autoencoder {
             f: task.networks.f.cast(),
