@@ -30,8 +30,8 @@ struct Shared {
     panicked: AtomicBool,
 }
 
-/// A thread's own pieces: every so-manieth of the list. It takes them from the first, others take them from the last. On a cache line
-/// of its own.
+/// A thread's own pieces: of n threads each has every n-th of the list. It takes them from the first, others take them from the last.
+/// On a cache line of its own.
 #[derive(Default)]
 #[repr(align(64))]
 struct Own(AtomicU64);
@@ -272,6 +272,8 @@ mod tests {
             pool.for_each(&mut [0_u32; 64], |_| panic!("planned"));
         }));
         assert!(result.is_err());
+        // As if a helper had panicked too, which is left to chance here.
+        pool.shared.panicked.store(true, Ordering::Relaxed);
         let mut items = [1_u32; 8];
         pool.for_each(&mut items, |item| *item += 1);
         assert_eq!(items, [2; 8]);

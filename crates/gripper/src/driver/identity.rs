@@ -135,3 +135,21 @@ impl Identity {
         !self.known && !F::PROBES.is_empty()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn silence_proves_no_family_once_another_has_answered() {
+        let proved = |mut identity: Identity| {
+            (0..SILENT.0).for_each(|_| identity.wide_silence());
+            identity.near_answer(function::READ_INPUT);
+            identity.known
+        };
+        assert!(proved(Identity::default()));
+        let mut met = Identity::default();
+        assert_eq!(met.is_foreign(), Kind::ThreeFinger);
+        assert!(!proved(met));
+    }
+}

@@ -110,7 +110,7 @@ pub struct Plan {
     pub last_epochs: usize,
     /// The optimiser's.
     pub rate: LearningRate,
-    /// How much larger the rate is in all stages but the last.
+    /// The factor of the rate in all stages but the last.
     pub stage_rate: f64,
     /// The last epochs, in which the rate falls in a straight line to nothing on top of that; 0: it does not.
     pub cooling_epochs: usize,
