@@ -2,7 +2,7 @@
 //! stall, jump and run backwards. After every step an independent checker looks at the rules.
 
 use bridge::supervisor::{Hand, Inputs, Output, Supervisor, Weights};
-use bridge::{Config, HoldReason, Instant, SafeAction, Settings, State};
+use bridge::{Clutch, Config, HoldReason, Instant, SafeAction, Settings, State};
 use gripper::registers::Fault;
 use gripper::{Activation, Contact, Motion, Status};
 use rand::{Rng, SeedableRng};
@@ -57,6 +57,11 @@ struct World {
     inputs: Inputs<4>,
 }
 
+/// A clutch whose newest heartbeat came at `beat`.
+fn closed(beat: Instant) -> Clutch {
+    Clutch::Closed { epoch: 0, beat }
+}
+
 fn at(us: u64) -> Instant {
     Instant::from_ticks(us)
 }
@@ -80,7 +85,7 @@ impl World {
             gripper: true,
             wanted: [100.0; 4],
             inputs: Inputs {
-                heartbeat: None,
+                clutch: Clutch::Open,
                 hand: None,
                 status: None,
                 weights: Weights::Ready,
@@ -152,11 +157,11 @@ impl World {
         if self.dice.permille(toggle) {
             self.clutch = !self.clutch;
             if !self.clutch && self.dice.permille(500) {
-                self.inputs.heartbeat = None;
+                self.inputs.clutch = Clutch::Open;
             }
         }
         if self.clutch {
-            self.inputs.heartbeat = Some(at(if self.dice.permille(2) {
+            self.inputs.clutch = closed(at(if self.dice.permille(2) {
                 self.now + self.dice.below(1_000_000)
             } else {
                 self.now - self.dice.below(80_000).min(self.now)
@@ -284,11 +289,10 @@ impl Checker {
         }
         let moving = output.state.is_moving();
         if moving {
-            let beat = world
-                .inputs
-                .heartbeat
-                .expect("no motion without the clutch")
-                .as_ticks();
+            let Clutch::Closed { beat, .. } = world.inputs.clutch else {
+                panic!("no motion without the clutch");
+            };
+            let beat = beat.as_ticks();
             assert!(
                 world.now >= beat && world.now - beat < 250_000,
                 "heartbeat {beat}"

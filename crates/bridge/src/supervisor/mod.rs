@@ -7,15 +7,18 @@ mod command;
 mod hand;
 pub mod limits;
 pub mod state;
+mod underway;
 
 pub use hand::Hand;
-pub use state::{Clutch, Conditions, GripperFault, HoldReason, State};
+pub use state::{Conditions, GripperFault, HoldReason, State};
 
+use crate::clutch::Clutch;
 use crate::config::Config;
 use crate::{Duration, Instant, timing};
 use gripper::registers::Fault;
 use gripper::{Activation, Motion, Status};
-use hand::{Follower, Used, is_fresh};
+use hand::{Follower, Used};
+use underway::Underway;
 
 /// Whether there is a map to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,8 +34,8 @@ pub enum Weights {
 /// Everything a step looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs<const X: usize> {
-    /// When the clutch's newest heartbeat came; `None` when the person opened the clutch or never closed it.
-    pub heartbeat: Option<Instant>,
+    /// The clutch.
+    pub clutch: Clutch,
     /// The newest frame; the same one may be given again.
     pub hand: Option<Hand<X>>,
     /// The gripper's newest status; the same one may be given again.
@@ -54,7 +57,7 @@ pub struct Output<const X: usize> {
     pub stamp: Instant,
     /// Where the hand wants the gripper, counts: filtered, inside the configuration space.
     pub target: Option<[f32; X]>,
-    /// How much later than its period the step came, when that is more than 2 ms.
+    /// How much later than its period the step came, when that is more than 2 ms. A stall is told here too.
     pub late: Option<Duration>,
 }
 
@@ -75,6 +78,7 @@ pub struct Supervisor<const X: usize> {
     moved: bool,
     held_since: Option<Instant>,
     blend: Blend<X>,
+    underway: Underway<X>,
     was_ready: bool,
     ignored_since: Option<Instant>,
 }
@@ -110,6 +114,7 @@ impl<const X: usize> Supervisor<X> {
                 from: [0.0; X],
                 since: Instant::from_ticks(0),
             },
+            underway: Underway::new(),
             was_ready: false,
             ignored_since: None,
         }
@@ -134,14 +139,17 @@ impl<const X: usize> Supervisor<X> {
 
     /// One step. Call it every 10 ms, and whenever a new frame should be answered at once.
     pub fn step(&mut self, now: Instant, inputs: &Inputs<X>) -> Output<X> {
-        let gap = self.elapse(now);
+        let elapsed = self.elapse(now);
+        let gap = elapsed.filter(|gap| *gap <= timing::LONGEST_GAP);
         if gap.is_none() {
             self.follower.forget();
         }
         if let Some(hand) = &inputs.hand {
             self.follower.accept(now, hand);
         }
-        let status = inputs.status.filter(|status| is_fresh(now, status.stamp));
+        let status = inputs
+            .status
+            .filter(|status| timing::is_fresh(now, status.stamp));
         let (conditions, used) = self.conditions(now, inputs, status.as_ref(), gap.is_none());
         let before = self.state;
         self.state = state::next(before, &conditions);
@@ -152,23 +160,25 @@ impl<const X: usize> Supervisor<X> {
             status.as_ref(),
             used,
         );
+        if let Some(motion) = &motion {
+            self.underway.decided(now, motion.position);
+        }
         Output {
             state: self.state,
             before,
             motion,
             stamp,
             target: self.follower.target(),
-            late: gap.and_then(lateness),
+            late: elapsed.and_then(lateness),
         }
     }
 }
 
 impl<const X: usize> Supervisor<X> {
-    /// Time since the step before: `None` when it cannot be taken as one stretch (a stall, or a clock that ran backwards).
+    /// Time since the step before; `None` when the clock ran backwards.
     fn elapse(&mut self, now: Instant) -> Option<Duration> {
         let before = self.stepped.replace(now).unwrap_or(now);
         now.checked_duration_since(before)
-            .filter(|gap| *gap <= timing::LONGEST_GAP)
     }
 
     /// Everything that decides the next state, and the frame to follow if there is one.
@@ -198,7 +208,7 @@ impl<const X: usize> Supervisor<X> {
         };
         let stall = stalled.then_some(HoldReason::ClockGap);
         let conditions = Conditions {
-            clutch: clutch(now, inputs.heartbeat),
+            clutch: inputs.clutch.position(now),
             fault,
             obstacle: gripper.or(stall).or(weights).or(follow.err()),
             blended: since(now, self.blend.since) >= self.blend_time(),
@@ -273,17 +283,6 @@ impl<const X: usize> Supervisor<X> {
 
     fn blend_time(&self) -> Duration {
         Duration::from_ticks(1_000 * u64::from(self.config.settings().blend_ms))
-    }
-}
-
-/// The clutch by its heartbeat. A heartbeat from the future is none.
-fn clutch(now: Instant, heartbeat: Option<Instant>) -> Clutch {
-    match heartbeat {
-        None => Clutch::Open,
-        Some(beat) => match now.checked_duration_since(beat) {
-            Some(age) if age < timing::HEARTBEAT_TIMEOUT => Clutch::Closed,
-            _ => Clutch::Lost,
-        },
     }
 }
 

@@ -3,6 +3,7 @@
 extern crate std;
 
 use super::*;
+use crate::clutch::Clutch;
 use crate::config::{SafeAction, Settings};
 use gripper::Contact;
 use std::vec::Vec;
@@ -30,6 +31,11 @@ struct Bench {
     last: Option<Output<4>>,
 }
 
+/// A clutch whose newest heartbeat came at `beat`.
+fn closed(beat: Instant) -> Clutch {
+    Clutch::Closed { epoch: 0, beat }
+}
+
 fn at(us: u64) -> Instant {
     Instant::from_ticks(us)
 }
@@ -53,7 +59,7 @@ impl Bench {
             now: 1_000 * MS,
             supervisor: Supervisor::new(Config::new(settings).unwrap()),
             inputs: Inputs {
-                heartbeat: None,
+                clutch: Clutch::Open,
                 hand: None,
                 status: Some(status([10, 20, 30, 137])),
                 weights: Weights::Ready,
@@ -83,7 +89,7 @@ impl Bench {
             self.frame(Ok(self.output), now - 5 * MS);
         }
         if self.beating {
-            self.inputs.heartbeat = Some(at(now));
+            self.inputs.clutch = closed(at(now));
         }
         self.step()
     }
