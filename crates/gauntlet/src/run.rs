@@ -1,5 +1,6 @@
 //! A run of the bridge as a person sees it: heartbeat, keys, live view, log and numbers, until its time is over.
 
+pub mod calibrating;
 mod numbers;
 
 use std::collections::VecDeque;
@@ -8,6 +9,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::State;
+use bridge::clutch::Position;
 use glove::hand::LIMITS;
 use gripper::Activation;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -17,8 +19,9 @@ use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
 use crate::platform::Clock;
 use crate::record::{AXES, Record, Sort};
-use crate::session::{Order, Session, Snapshot, Stopped};
+use crate::session::{Order, Session, Snapshot};
 use crate::session_log::{SessionLog, Written};
+use crate::stopped::Stopped;
 use crate::{out, words};
 
 pub use numbers::{Numbers, Summary};
@@ -27,6 +30,8 @@ pub use numbers::{Numbers, Summary};
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
 const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
+/// After this long the bridge has seen that the clutch was closed.
+const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
 /// Faults shown at once.
 const SHOWN_FAULTS: usize = 5;
 /// How long a fault stays on the view after it happened.
@@ -74,8 +79,9 @@ pub struct Run {
     interrupt: Interrupt,
     numbers: Numbers,
     clutch: bool,
+    /// When a person closed it last.
+    engaged: Option<Instant>,
     heartbeat: Option<Instant>,
-    calibrations: u64,
     recent_faults: VecDeque<(Instant, String)>,
 }
 
@@ -94,8 +100,8 @@ impl Run {
             interrupt,
             numbers: Numbers::default(),
             clutch: false,
+            engaged: None,
             heartbeat: None,
-            calibrations: 0,
             recent_faults: VecDeque::new(),
         }
     }
@@ -161,11 +167,6 @@ impl Run {
         Ok(false)
     }
 
-    /// How often a flat hand was taken as calibration.
-    pub fn calibrations(&self) -> u64 {
-        self.calibrations
-    }
-
     /// Tells the bridge something.
     pub fn order(&self, order: Order) {
         self.session.order(order);
@@ -179,7 +180,9 @@ impl Run {
         let terminal = || "the terminal does not work".to_owned();
         let next = "`gauntlet … | cat`, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
-        self.clutch = options.engage;
+        if options.engage {
+            self.engage();
+        }
         let started = Instant::now();
         self.numbers.begin();
         let mut last_round = started;
@@ -234,14 +237,36 @@ impl Run {
         match key {
             Key::End => self.interrupt.ask(),
             Key::Clutch => {
-                self.clutch = !self.clutch;
-                self.heartbeat = None;
-                if !self.clutch {
+                if self.clutch {
+                    self.clutch = false;
                     self.order(Order::Release);
+                } else {
+                    self.engage();
                 }
             }
-            Key::Calibrate => self.order(Order::Calibrate),
+            Key::Calibrate => self.order(Order::Calibrate(glove::timing::STILL_WAIT)),
         }
+    }
+
+    /// Closes the clutch: an act of a person.
+    fn engage(&mut self) {
+        let now = Instant::now();
+        (self.clutch, self.engaged, self.heartbeat) = (true, Some(now), Some(now));
+        self.order(Order::Engage);
+    }
+
+    /// Sees that the clutch opened by itself. Returns whether it just did.
+    fn clutch_opened(&mut self) -> bool {
+        let settled = self.engaged.is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
+        let open = self
+            .session
+            .snapshot()
+            .is_some_and(|seen| matches!(seen.clutch, Position::Open | Position::Expired));
+        let opened = self.clutch && settled && open;
+        if opened {
+            self.clutch = false;
+        }
+        opened
     }
 
     /// What has to be done every few milliseconds.
@@ -257,8 +282,9 @@ impl Run {
             .is_none_or(|last| now.duration_since(last) >= HEARTBEAT - ROUND / 2);
         if self.clutch && due {
             self.heartbeat = Some(now);
-            self.order(Order::Engage);
+            self.order(Order::Heartbeat);
         }
+        self.clutch_opened();
         self.take_records();
         Ok(())
     }
@@ -279,10 +305,6 @@ impl Run {
                         self.recent_faults.pop_front();
                     }
                 }
-                Record::Event {
-                    sort: Sort::Calibrated,
-                    ..
-                } => self.calibrations += 1,
                 _ => {}
             }
             if let Some(log) = &mut self.log {
