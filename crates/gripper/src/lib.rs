@@ -75,7 +75,8 @@ pub enum Activation {
 /// What a gripper said about itself in one reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status<const X: usize> {
-    /// When the reply was complete.
+    /// When the request it answers was sent: the gripper said this then or later. However long the
+    /// reply lay in a buffer, the status is never taken for younger than it is.
     pub stamp: Instant,
     /// Whether it can move.
     pub activation: Activation,
