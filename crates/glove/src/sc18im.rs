@@ -34,6 +34,9 @@ const REPLY_MAX: usize = 49;
 /// Most bytes taken from the port in one poll, so that a babbling line cannot hold the caller.
 const READ_MAX: usize = 128;
 
+/// Most bytes thrown away before a question: what a system's buffer holds. More means a line that babbles.
+const DISCARD_MAX: usize = 4_096;
+
 /// How the serial bridge is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Config {
@@ -63,6 +66,8 @@ pub struct Counters {
     pub lost: u32,
     /// Bytes that belonged to no reply: noise, or late.
     pub stray: u32,
+    /// Replies thrown away because they were read after their deadline: the caller stood still.
+    pub stalled: u32,
     /// Times the serial bridge lost step.
     pub resyncs: u32,
     /// Failures of the serial port.
@@ -242,6 +247,16 @@ impl<S: SerialPort> Sc18im<S> {
         Ok(total)
     }
 
+    /// Throws away all that waits, at most [`DISCARD_MAX`] bytes; false if more is there, as on a line that babbles.
+    fn discard(&mut self) -> Result<bool, Error> {
+        for _ in 0..DISCARD_MAX / READ_MAX {
+            if self.pump(0)? < READ_MAX {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     fn port_error(&mut self) -> Error {
         self.counters.port_errors = self.counters.port_errors.wrapping_add(1);
         Error::Port
@@ -285,11 +300,19 @@ impl<S: SerialPort> Sc18im<S> {
         now: Instant,
     ) -> Result<Option<Reply>, Error> {
         self.pump(expected.bytes)?;
-        if self.received.len() >= expected.bytes {
-            return self.finish(expected, now);
-        }
+        let complete = self.received.len() >= expected.bytes;
         if now >= deadline {
+            // The deadline is judged before the bytes: what lay there while the caller stood still is no news.
+            if complete && self.discard()? {
+                self.counters.stalled = self.counters.stalled.wrapping_add(1);
+                self.state = State::Idle;
+                return Err(Error::Stalled);
+            }
             self.drain(expected, 0, now);
+            return Ok(None);
+        }
+        if complete {
+            return self.finish(expected, now);
         }
         Ok(None)
     }
@@ -330,9 +353,16 @@ impl<S: SerialPort> Bus for Sc18im<S> {
         let (command, expected) = command::batch(batch)?;
         self.require_idle()?;
         // What is there before the question is not its answer.
-        if self.pump(0).is_err() {
-            self.go_down(now, 0);
-            return Err(Error::Port);
+        match self.discard() {
+            Ok(true) => {}
+            Ok(false) => {
+                self.go_down(now, 0);
+                return Err(Error::NoAnswer);
+            }
+            Err(_) => {
+                self.go_down(now, 0);
+                return Err(Error::Port);
+            }
         }
         self.received.clear();
         self.send_or_fail(&command, now)?;
