@@ -139,7 +139,8 @@ impl Session {
                         baud: BAUD,
                         ..scan::Config::default()
                     },
-                );
+                )
+                .with_set_baud(Port::set_baud);
                 let config = parts.gripper.driver_config(Settings::default());
                 let gripper = ThreeFinger::new(parts.gripper, config);
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);

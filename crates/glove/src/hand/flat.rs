@@ -106,6 +106,10 @@ fn degrees(radians: f32) -> f32 {
 }
 
 /// How far a calibration has come.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "made once a step and looked at once; there is no allocator"
+)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Progress {
     /// Not yet.
