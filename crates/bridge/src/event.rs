@@ -53,6 +53,11 @@ pub enum Kind {
     },
     /// The gripper's fault changed; [`Fault::None`] when it is gone.
     GripperFault(Fault),
+    /// This axis of the gripper stands although it has been told to move for 1.5 s, and says nothing of an obstacle.
+    AxisStands {
+        /// The axis, from 0.
+        axis: u8,
+    },
     /// The gripper was asked to activate: it moves.
     ActivationRequested,
     /// A try to calibrate ended this way.
@@ -119,6 +124,11 @@ impl core::fmt::Display for Kind {
             }
             Kind::GripperFault(Fault::None) => f.write_str("the gripper's fault is gone"),
             Kind::GripperFault(fault) => write!(f, "gripper {fault}"),
+            Kind::AxisStands { axis } => write!(
+                f,
+                "{} of the gripper stands still although it is told to move",
+                crate::telemetry::axis_name(*axis)
+            ),
             Kind::ActivationRequested => f.write_str("the gripper was asked to activate: it moves"),
             Kind::Calibration(Try::Taken) => f.write_str("calibrated on the flat hand"),
             Kind::Calibration(Try::Undone) => f.write_str("the newest calibration was taken back"),

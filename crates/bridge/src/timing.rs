@@ -34,6 +34,12 @@ pub const SAFE_AFTER: Duration = Duration::from_ticks(500_000);
 /// A gripper that is written to for this long and does not report gGTO is not following.
 pub const IGNORED_AFTER: Duration = Duration::from_ticks(500_000);
 
+/// A gripper that echoes one and the same position for this long while it is told others is not following.
+pub const ECHO_AFTER: Duration = Duration::from_ticks(1_000_000);
+
+/// An axis that stands for this long although it is told to move is told of.
+pub const STANDS_AFTER: Duration = Duration::from_ticks(1_500_000);
+
 /// Longest time one step of the loop may take, whatever the devices do.
 pub const STEP_BUDGET: Duration = Duration::from_ticks(1_000);
 

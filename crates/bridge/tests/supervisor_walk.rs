@@ -49,7 +49,10 @@ struct World {
     activation: Activation,
     fault: Fault,
     going_to: bool,
+    /// Counts in 10 ms.
     speed: f32,
+    /// Somebody pushes this axis there.
+    pushed: Option<(usize, f32)>,
     clutch: bool,
     glove: bool,
     gripper: bool,
@@ -79,7 +82,8 @@ impl World {
             activation: Activation::Ready,
             fault: Fault::None,
             going_to: false,
-            speed: 2.0,
+            speed: 1.8,
+            pushed: None,
             clutch: false,
             glove: true,
             gripper: true,
@@ -94,8 +98,9 @@ impl World {
     }
 
     fn turn(&mut self) {
+        let before = self.now;
         self.clock();
-        self.plant();
+        self.plant(self.now.saturating_sub(before));
         self.person();
         self.frames();
         self.statuses();
@@ -117,17 +122,19 @@ impl World {
         };
     }
 
-    fn plant(&mut self) {
+    fn plant(&mut self, us: u64) {
+        let way = |speed: f32| speed * us as f32 * 1e-4;
         for axis in 0..4 {
             let goal = f32::from(self.echo[axis]);
             let free = !matches!(
                 self.contact[axis],
                 Contact::ContactOpening | Contact::ContactClosing
             );
-            if free && self.going_to && self.activation == Activation::Ready {
+            let pushed = self.pushed.is_some_and(|(pushed, _)| pushed == axis);
+            if free && !pushed && self.going_to && self.activation == Activation::Ready {
                 self.position[axis] = goal.clamp(
-                    self.position[axis] - self.speed,
-                    self.position[axis] + self.speed,
+                    self.position[axis] - way(self.speed),
+                    self.position[axis] + way(self.speed),
                 );
             }
             if self.dice.permille(3) {
@@ -138,13 +145,18 @@ impl World {
                     _ => Contact::AtPosition,
                 };
             }
-            // Somebody pushes a finger.
+            // Somebody pushes a finger, no faster than it could move.
             if self.dice.permille(1) {
-                self.position[axis] = f32::from(self.dice.byte());
+                self.pushed = Some((axis, f32::from(self.dice.byte())));
             }
         }
+        if let Some((axis, goal)) = self.pushed {
+            let here = self.position[axis];
+            self.position[axis] = goal.clamp(here - way(1.8), here + way(1.8));
+            self.pushed = self.pushed.filter(|_| self.position[axis] != goal);
+        }
         if self.dice.permille(5) {
-            self.speed = self.dice.below(60) as f32 / 10.0;
+            self.speed = self.dice.below(19) as f32 / 10.0;
         }
         // Another program set a far position once.
         if self.dice.permille(1) {
@@ -320,8 +332,12 @@ impl Checker {
             (self.settings.speed, self.settings.force)
         );
         assert_eq!(status.activation, Activation::Ready);
+        // A second step at the very instant of the first repeats it.
+        let again = self.before.is_some_and(|(then, before, _)| {
+            then == world.now && !before.before.is_moving() && before.motion == Some(motion)
+        });
         match output.state {
-            State::Blending | State::Following if output.before.is_moving() => {
+            State::Blending | State::Following if output.before.is_moving() && !again => {
                 self.moves += 1;
                 self.led(&motion, &status);
                 self.inside(&motion, &status);

@@ -68,6 +68,8 @@ where
     gripper_error: Option<R::Error>,
     sensors: Sensors,
     calibrating: Calibrating,
+    /// The axis that stood still in the newest step.
+    stands: Option<u8>,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
     telemetry: Telemetry<X>,
@@ -118,6 +120,7 @@ where
             gripper_error: None,
             sensors: Sensors::default(),
             calibrating: Calibrating::default(),
+            stands: None,
             weights: None,
             frame_at: None,
             events: heapless::Deque::new(),

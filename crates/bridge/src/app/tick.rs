@@ -225,6 +225,10 @@ where
                 },
             );
         }
+        if let Some(axis) = output.stands.filter(|_| self.stands != output.stands) {
+            self.tell(now, Kind::AxisStands { axis });
+        }
+        self.stands = output.stands;
         if let Some(by) = output.late {
             self.tell(now, Kind::Late { by });
         }

@@ -3,6 +3,7 @@
 //! [`Supervisor::step`] takes the time and everything it needs as arguments, does no I/O and reads no clock: the same
 //! inputs give the same commands on every machine. `docs/safety.md` says which rule it keeps, where and how it is tested.
 
+mod believed;
 mod command;
 mod hand;
 pub mod limits;
@@ -15,6 +16,7 @@ pub use state::{Conditions, GripperFault, HoldReason, State};
 use crate::clutch::Clutch;
 use crate::config::Config;
 use crate::{Duration, Instant, timing};
+use believed::Believed;
 use gripper::registers::Fault;
 use gripper::{Activation, Motion, Status};
 use hand::{Follower, Used};
@@ -57,6 +59,8 @@ pub struct Output<const X: usize> {
     pub stamp: Instant,
     /// Where the hand wants the gripper, counts: filtered, inside the configuration space.
     pub target: Option<[f32; X]>,
+    /// This axis stands still although it has been told to move for 1.5 s, and says nothing of an obstacle.
+    pub stands: Option<u8>,
     /// How much later than its period the step came, when that is more than 2 ms. A stall is told here too.
     pub late: Option<Duration>,
 }
@@ -79,8 +83,22 @@ pub struct Supervisor<const X: usize> {
     held_since: Option<Instant>,
     blend: Blend<X>,
     underway: Underway<X>,
+    believed: Believed<X>,
     was_ready: bool,
+    /// What the gripper echoes is not what it is told.
+    ignored: bool,
     ignored_since: Option<Instant>,
+}
+
+/// What the gripper says, as far as it decides the next state.
+#[derive(Debug, Clone, Copy)]
+struct Said<const X: usize> {
+    /// Its newest status, while that is fresh.
+    status: Option<Status<X>>,
+    /// This axis says, again and again, that it is where it cannot be.
+    implausible: Option<u8>,
+    /// There are positions that can be true, and they are fresh.
+    believed: bool,
 }
 
 /// How a command moves.
@@ -115,7 +133,9 @@ impl<const X: usize> Supervisor<X> {
                 since: Instant::from_ticks(0),
             },
             underway: Underway::new(),
+            believed: Believed::new(),
             was_ready: false,
+            ignored: false,
             ignored_since: None,
         }
     }
@@ -147,13 +167,23 @@ impl<const X: usize> Supervisor<X> {
         if let Some(hand) = &inputs.hand {
             self.follower.accept(now, hand);
         }
-        let status = inputs
-            .status
-            .filter(|status| timing::is_fresh(now, status.stamp));
-        let (conditions, used) = self.conditions(now, inputs, status.as_ref(), gap.is_none());
+        let fresh = |status: &Status<X>| timing::is_fresh(now, status.stamp);
+        let said = inputs.status.filter(fresh);
+        let judged = said.map(|status| self.believed.take(now, &status));
+        let status = judged.and_then(|judged| judged.status).filter(fresh);
+        let implausible = judged.and_then(|judged| judged.implausible);
+        let gripper = Said {
+            status: said,
+            implausible,
+            believed: status.is_some(),
+        };
+        let (conditions, used) = self.conditions(now, inputs, &gripper, gap.is_none());
         let before = self.state;
         self.state = state::next(before, &conditions);
         self.enter(now, before, status.as_ref());
+        if self.state == State::Idle && implausible.is_some() {
+            self.believed.forget();
+        }
         let (motion, stamp) = self.motion(
             now,
             gap.unwrap_or(Duration::from_ticks(0)),
@@ -169,6 +199,7 @@ impl<const X: usize> Supervisor<X> {
             motion,
             stamp,
             target: self.follower.target(),
+            stands: self.stands(now, status.as_ref(), motion.as_ref()),
             late: elapsed.and_then(lateness),
         }
     }
@@ -186,18 +217,20 @@ impl<const X: usize> Supervisor<X> {
         &mut self,
         now: Instant,
         inputs: &Inputs<X>,
-        status: Option<&Status<X>>,
+        said: &Said<X>,
         stalled: bool,
     ) -> (Conditions, Option<Used<X>>) {
-        let fault = self.gripper_fault(now, status);
+        let fault = self.gripper_fault(now, said);
         let wanted = if self.state.is_moving() {
             0
         } else {
             self.config.settings().fresh_frames
         };
         let follow = self.follower.follow(now, wanted);
-        let gripper = match status.map(|status| status.activation) {
+        let gripper = match said.status.map(|status| status.activation) {
             None => Some(HoldReason::GripperSilent),
+            // Until a second status agrees with the first nobody knows where it is.
+            Some(Activation::Ready) if !said.believed => Some(HoldReason::GripperSilent),
             Some(Activation::Ready) => None,
             Some(other) => Some(HoldReason::GripperNotReady(other)),
         };
@@ -221,8 +254,8 @@ impl<const X: usize> Supervisor<X> {
     }
 
     /// A fault of the gripper at this moment. Whether it *lost* its activation is judged from the clutch's closing on.
-    fn gripper_fault(&mut self, now: Instant, status: Option<&Status<X>>) -> Option<GripperFault> {
-        let status = status?;
+    fn gripper_fault(&mut self, now: Instant, said: &Said<X>) -> Option<GripperFault> {
+        let status = said.status?;
         let ready = status.activation == Activation::Ready;
         self.was_ready = ready || (self.was_ready && self.state != State::Idle);
         if !self.state.is_moving() || status.going_to {
@@ -237,12 +270,30 @@ impl<const X: usize> Supervisor<X> {
             )
         {
             Some(GripperFault::ActivationLost(status.activation))
+        } else if let Some(axis) = said.implausible {
+            Some(GripperFault::Implausible { axis })
         } else if self.state.is_moving() && !status.going_to {
             let start = *self.ignored_since.get_or_insert(now);
             (since(now, start) >= timing::IGNORED_AFTER).then_some(GripperFault::CommandIgnored)
         } else {
-            None
+            self.ignored.then_some(GripperFault::CommandIgnored)
         }
+    }
+
+    /// Looks whether the gripper does what it is told: the axis that stands, and for the next step whether it echoes.
+    fn stands(
+        &mut self,
+        now: Instant,
+        status: Option<&Status<X>>,
+        motion: Option<&Motion<X>>,
+    ) -> Option<u8> {
+        self.ignored = false;
+        let (Some(status), Some(motion), true) = (status, motion, self.state.is_moving()) else {
+            self.believed.rest();
+            return None;
+        };
+        self.ignored = self.believed.ignores(now, status, motion);
+        self.believed.stands(now, status, motion)
     }
 
     /// What a change of state sets up.

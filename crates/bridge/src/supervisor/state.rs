@@ -151,7 +151,8 @@ impl core::fmt::Display for GripperFault {
             }
             GripperFault::Implausible { axis } => write!(
                 f,
-                "the gripper says that axis {axis} jumped farther than it can move"
+                "the gripper says that {} jumped farther than it can move",
+                crate::telemetry::axis_name(*axis)
             ),
             GripperFault::CommandIgnored => f.write_str("the gripper does not go to its commands"),
         }

@@ -9,6 +9,7 @@ use gripper::Contact;
 use std::vec::Vec;
 
 mod age;
+mod doubt;
 mod faults;
 mod start;
 mod targets;
