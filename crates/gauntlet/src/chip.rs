@@ -266,7 +266,11 @@ impl<'a> Watch<'a> {
                     self.status = Some(self.link.release().map_err(Failure::from)?);
                 }
             }
-            Key::Clutch | Key::Calibrate => {}
+            Key::Open if self.clutch => {
+                self.clutch = false;
+                self.status = Some(self.link.release().map_err(Failure::from)?);
+            }
+            Key::Clutch | Key::Open | Key::Calibrate => {}
         }
         Ok(())
     }
@@ -338,7 +342,9 @@ impl<'a> Watch<'a> {
             state: state.as_ref().map_or("starting", State::name).to_owned(),
             following: state.is_some_and(|state| state.is_moving()),
             fingers: self.sample.as_ref().map(fingers).unwrap_or_default(),
+            hand_age: None,
             axes: self.sample.as_ref().map(axes).unwrap_or_default(),
+            gripper_age: None,
             frames_per_s: self.frames.now(now_us),
             cycles_per_s: self.cycles_per_s,
             latency_p50: self.latency.at(0.5),

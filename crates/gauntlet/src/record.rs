@@ -1,5 +1,6 @@
 //! What a run hands to whoever watches it: frames, commands, statuses and events, each exactly once.
 
+use bridge::event::Kind;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::Health;
 use gripper::Instant;
@@ -82,6 +83,8 @@ pub enum Record {
         sort: Sort,
         /// What.
         text: String,
+        /// The same for the program.
+        kind: Kind,
     },
 }
 
