@@ -18,7 +18,7 @@ use crate::failure::{Failure, OrFail};
 use crate::host_link::{Error, Heartbeat, HostLink};
 use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
-use crate::run::End;
+use crate::run::{End, clutch_expired};
 use crate::stats::{Percentiles, Rate, short_or_dash};
 use crate::stopped::Stopped;
 use crate::words;
@@ -139,11 +139,7 @@ impl Watched {
         if !self.expired {
             return Ok(());
         }
-        Err(Failure::new(
-            "the clutch opened by itself: no heartbeat reached the bridge for 1 s; the gripper was held from then on",
-            "the same on a machine with less to do, or over a shorter line",
-        )
-        .into())
+        Err(clutch_expired().into())
     }
 }
 
@@ -326,7 +322,11 @@ impl<'a> Watch<'a> {
                 self.status = Some(self.link.release().map_err(Failure::from)?);
             }
             Key::Clutch if options.engage => self.engage()?,
-            Key::Clutch | Key::Calibrate => {}
+            Key::Open if self.epoch.is_some() => {
+                self.epoch = None;
+                self.status = Some(self.link.release().map_err(Failure::from)?);
+            }
+            Key::Clutch | Key::Open | Key::Calibrate => {}
         }
         Ok(())
     }
@@ -398,7 +398,9 @@ impl<'a> Watch<'a> {
             state: state.as_ref().map_or("starting", State::name).to_owned(),
             following: state.is_some_and(|state| state.is_moving()),
             fingers: self.sample.as_ref().map(fingers).unwrap_or_default(),
+            hand_age: None,
             axes: self.sample.as_ref().map(axes).unwrap_or_default(),
+            gripper_age: None,
             frames_per_s: self.frames.now(now_us),
             cycles_per_s: self.cycles_per_s,
             latency_p50: self.latency.at(0.5),

@@ -371,6 +371,7 @@ impl Worker {
                 at: event.at,
                 sort: sort(&event.kind),
                 text: event.kind.to_string(),
+                kind: event.kind,
             });
         }
         self.seen = Seen {

@@ -10,13 +10,11 @@ use serde_json::json;
 use crate::cli::{Hand, Teleop};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::outputs::Kind;
 use crate::platform::Clock;
 use crate::port::BAUD;
 use crate::record::AXES;
 use crate::run::{Options, Run};
 use crate::session::{Order, Parts, Session};
-use crate::session_log::SessionLog;
 use crate::tell::Tell;
 use crate::{model, out, outputs, ports, probe, words};
 
@@ -33,7 +31,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_ports(options)?;
     if let Some(path) = &options.log {
-        outputs::check(path, Kind::Log, &[&options.model])?;
+        outputs::check_new(path)?;
     }
     let image = model::weights(&options.model, None)?.image;
     let config = config(options.hand)?;
@@ -56,11 +54,6 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         ));
     }
     let clock = Clock::start();
-    let log = options
-        .log
-        .as_deref()
-        .map(|path| SessionLog::create(path, clock))
-        .transpose()?;
     let parts = Parts {
         glove: glove.port,
         gripper,
@@ -68,33 +61,24 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         config,
     };
     let session = Session::start(parts, clock, interrupt)?;
-    let mut run = Run::new(session, log, clock, interrupt.clone());
-    let result = prepare(options, &mut run, &tell, interrupt, status).and_then(|go_on| {
+    let mut run = Run::new(session, options.log.clone(), clock, interrupt.clone());
+    let driven = prepare(options, &mut run, &tell, interrupt, status).and_then(|go_on| {
         if go_on {
             drive(options, &mut run)?;
         }
         Ok(())
     });
-    let finished = run.finish()?;
-    result?;
-    let left = finished.stopped.judge();
-    if let Ok(left) = &left {
-        tell.say(format_args!("{left}"));
-    }
-    if options.json {
+    let finished = run.finish();
+    if !options.json {
+        finished.tell(&tell, "");
+    } else if finished.ending.is_some() {
         out::json(&json!({
-            "gripper": finished.stopped,
+            "gripper": finished.gripper(),
             "run": finished.summary,
-            "log": finished.log.map(|log| log.path),
+            "log": finished.log,
         }))?;
-    } else {
-        let lines = finished.summary.lines();
-        lines
-            .iter()
-            .for_each(|line| tell.say(format_args!("{line}")));
-        tell.log(finished.log.as_ref());
     }
-    left.map(|_| ())
+    finished.judge(driven)
 }
 
 fn check_ports(options: &Teleop) -> Result<()> {
