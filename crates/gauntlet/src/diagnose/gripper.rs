@@ -155,6 +155,7 @@ fn elsewhere(path: &Path, found: Found, findings: &mut Findings, interrupt: &Int
     let settings = Settings {
         baud: other_baud.then_some(baud),
         unit: other_unit.then_some(unit),
+        ..Settings::default()
     };
     reopen(path, settings, findings, interrupt);
 }

@@ -1,8 +1,8 @@
 //! Whether the bytes received are the reply: length, CRC, then what the frame says.
 
 use super::{Echo, Error, Field, Link, MOST_SHIFTED, Signature};
-use crate::Instant;
 use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
+use crate::{Instant, timing};
 
 /// What the transaction under way expects.
 #[derive(Clone, Copy, Debug)]
@@ -92,13 +92,13 @@ impl Pending {
 
 impl<S> Link<S> {
     /// Judges what has been received, after taking an adapter's echo off its front.
-    pub(super) fn judge(&mut self, pending: &Pending) -> Verdict {
+    pub(super) fn judge(&mut self, pending: &Pending, now: Instant) -> Verdict {
         if self.strip_echo(pending) {
             return Verdict::More;
         }
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
         if let Some(owed) = self.owed.late_exception(bytes) {
-            self.owed.pay(owed);
+            self.note_late(owed, now);
             return Verdict::Wrong(Error::Stale);
         }
         if let Some(verdict) = exception(bytes, pending) {
@@ -114,10 +114,19 @@ impl<S> Link<S> {
             Ok(frame) => match (late, pending.check(&frame)) {
                 (None, Ok(())) => return Verdict::Reply,
                 (None, Err(field)) => return Verdict::Wrong(Error::Shape(field)),
-                (Some(owed), _) => self.owed.pay(owed),
+                (Some(owed), _) => self.note_late(owed, now),
             },
         }
         Verdict::Wrong(Error::Stale)
+    }
+
+    /// The reply of this look has come late: its debt is paid.
+    pub(super) fn note_late(&mut self, owed: Signature, now: Instant) {
+        if let Some(sent) = self.owed.sent(owed) {
+            let late = timing::since(now, sent);
+            self.lateness = Some(self.lateness.map_or(late, |before| before.max(late)));
+        }
+        self.owed.pay(owed);
     }
 
     /// Forgets the first `count` bytes received.

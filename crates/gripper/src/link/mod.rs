@@ -77,6 +77,8 @@ pub struct Link<S> {
     request: [u8; MAX_REQUEST],
     owed: Owed,
     counters: Counters,
+    /// The longest time from a request to the reply that came too late.
+    lateness: Option<Duration>,
     trace: Trace,
 }
 
@@ -96,6 +98,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
             request: [0; MAX_REQUEST],
             owed: Owed::default(),
             counters: Counters::default(),
+            lateness: None,
             trace: Trace::default(),
         }
     }
@@ -118,6 +121,11 @@ impl<S: Read + ReadReady + Write> Link<S> {
     /// What happened since the start.
     pub fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// How late the latest of the late replies came, counted from its request; `None` where none came late.
+    pub fn lateness(&self) -> Option<Duration> {
+        self.lateness
     }
 
     /// What happened last.
@@ -290,7 +298,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
             self.owed.add(pending.reply, pending.sent, now);
             return Some(Err(Error::Port(self.fail_port(fault, now))));
         } else {
-            self.judge(&pending)
+            self.judge(&pending, now)
         };
         let error = match verdict {
             Verdict::Reply => return Some(Ok(self.accept(&pending, now))),

@@ -146,6 +146,12 @@ impl Owed {
         }
     }
 
+    /// When the request of this look left, if its reply is owed.
+    pub(super) fn sent(&self, signature: Signature) -> Option<Instant> {
+        let owed = self.0.iter().find(|entry| entry.signature == signature);
+        owed.map(|entry| entry.sent)
+    }
+
     /// When the first debt ends.
     pub(super) fn earliest(&self) -> Option<Instant> {
         self.0.iter().map(|entry| entry.until).min()
