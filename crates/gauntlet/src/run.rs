@@ -1,5 +1,6 @@
 //! A run of the bridge as a person sees it: heartbeat, keys, live view, log and numbers, until its time is over.
 
+pub mod calibrating;
 mod ending;
 mod numbers;
 mod replies;
@@ -11,6 +12,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::clutch::Position;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::failure::OrFail;
@@ -38,6 +40,8 @@ const EARLY: usize = 8192;
 const FILE_LIMIT_TOLD: Duration = Duration::from_millis(300);
 /// For the hold before Ctrl-Z stops the program.
 const SUSPEND_HOLD: Duration = Duration::from_millis(500);
+/// After this long the bridge has seen that the clutch was closed.
+const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
 
 /// How a run goes.
 #[derive(Debug)]
@@ -77,8 +81,9 @@ pub struct Run {
     interrupt: Interrupt,
     numbers: Numbers,
     clutch: bool,
+    /// When a person closed it last.
+    engaged: Option<Instant>,
     heartbeat: Option<Instant>,
-    calibrations: u64,
     shown: Shown,
     /// The view was not taken for so long that nobody sees it.
     unseen: bool,
@@ -107,8 +112,8 @@ impl Run {
             interrupt,
             numbers: Numbers::default(),
             clutch: false,
+            engaged: None,
             heartbeat: None,
-            calibrations: 0,
             shown: Shown::default(),
             unseen: false,
             file_limit: None,
@@ -177,11 +182,6 @@ impl Run {
         Ok(false)
     }
 
-    /// How often a flat hand was taken as calibration.
-    pub fn calibrations(&self) -> u64 {
-        self.calibrations
-    }
-
     /// Tells the bridge something.
     pub fn order(&self, order: Order) {
         self.session.order(order);
@@ -206,7 +206,9 @@ impl Run {
             || "Ctrl-Z cannot be caught".to_owned(),
             "ending other programs: the system lacks descriptors",
         )?;
-        self.clutch = options.engage;
+        if options.engage {
+            self.engage();
+        }
         let started = Instant::now();
         self.numbers.begin();
         let mut last_round = started;
@@ -310,10 +312,11 @@ impl Run {
         match key {
             Key::End => self.interrupt.ask(),
             Key::Clutch => {
-                self.clutch = !self.clutch;
-                self.heartbeat = None;
-                if !self.clutch {
+                if self.clutch {
+                    self.clutch = false;
                     self.order(Order::Release);
+                } else {
+                    self.engage();
                 }
             }
             Key::Open if self.clutch => {
@@ -321,8 +324,29 @@ impl Run {
                 self.order(Order::Release);
             }
             Key::Open => {}
-            Key::Calibrate => self.order(Order::Calibrate),
+            Key::Calibrate => self.order(Order::Calibrate(glove::timing::STILL_WAIT)),
         }
+    }
+
+    /// Closes the clutch: an act of a person.
+    fn engage(&mut self) {
+        let now = Instant::now();
+        (self.clutch, self.engaged, self.heartbeat) = (true, Some(now), Some(now));
+        self.order(Order::Engage);
+    }
+
+    /// Sees that the clutch opened by itself. Returns whether it just did.
+    fn clutch_opened(&mut self) -> bool {
+        let settled = self.engaged.is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
+        let open = self
+            .session
+            .snapshot()
+            .is_some_and(|seen| matches!(seen.clutch, Position::Open | Position::Expired));
+        let opened = self.clutch && settled && open;
+        if opened {
+            self.clutch = false;
+        }
+        opened
     }
 
     /// What has to be done every few milliseconds.
@@ -338,9 +362,10 @@ impl Run {
             .is_none_or(|last| now.duration_since(last) >= HEARTBEAT - ROUND / 2);
         if self.clutch && due && !self.unseen {
             self.heartbeat = Some(now);
-            self.order(Order::Engage);
+            self.order(Order::Heartbeat);
         }
         self.look_at_file_limit();
+        self.clutch_opened();
         self.take_records();
         Ok(())
     }
@@ -371,10 +396,6 @@ impl Run {
                     kind,
                     ..
                 } => self.shown.fault(text, *kind),
-                Record::Event {
-                    sort: Sort::Calibrated,
-                    ..
-                } => self.calibrations += 1,
                 Record::Status(status) => self.shown.status(status, Instant::now()),
                 _ => {}
             }
@@ -428,8 +449,12 @@ impl Run {
     /// The state, and what a person can do about it.
     fn state_words(&self, snapshot: &Snapshot, keys: bool) -> String {
         let name = snapshot.state.name();
-        if snapshot.state == bridge::State::Idle && keys && !self.clutch {
-            return format!("{name}: space closes the clutch");
+        if keys && !self.clutch {
+            match snapshot.clutch {
+                Position::Open => return format!("{name}: space closes the clutch"),
+                Position::Expired => return format!("{name}: space closes the clutch again"),
+                Position::Closed | Position::Lost => {}
+            }
         }
         name.to_owned()
     }
@@ -445,6 +470,9 @@ impl Run {
             }
         }
         faults.extend(self.log_end());
+        if snapshot.is_some_and(|seen| seen.clutch == Position::Expired) {
+            faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
+        }
         if let Some(snapshot) = snapshot {
             let scheduling = self.session.scheduling();
             let now = Instant::now();

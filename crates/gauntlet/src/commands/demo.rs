@@ -174,7 +174,7 @@ fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> R
         )
         .into());
     }
-    if !teleop::activate(run, tell, interrupt)? {
+    if !run.calibrate(tell)? || !teleop::activate(run, tell, interrupt)? {
         return Ok(End::Asked);
     }
     tell.say(format_args!(

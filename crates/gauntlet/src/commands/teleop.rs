@@ -22,8 +22,6 @@ use crate::{model, out, outputs, ports, probe, words};
 const FRAME_WAIT: Duration = Duration::from_secs(15);
 /// An activation takes a few seconds; a gripper that needs longer has a fault.
 pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
-/// For a calibration on the first good frame.
-const CALIBRATION_WAIT: Duration = Duration::from_secs(3);
 
 /// Runs until its time is over or somebody ends it.
 ///
@@ -131,7 +129,7 @@ fn prepare(
     if !framed {
         return Err(no_frames(&options.glove));
     }
-    if options.calibrate_flat && !calibrate(run, tell)? {
+    if options.calibrate_flat && !run.calibrate(tell)? {
         return Ok(false);
     }
     if status.activation == Activation::Ready {
@@ -162,25 +160,6 @@ fn prepare(
         "not activated: you can watch the hand, the gripper will not move"
     ));
     Ok(true)
-}
-
-/// Takes the hand as flat, now.
-fn calibrate(run: &mut Run, tell: &Tell) -> Result<bool> {
-    let calibrations = run.calibrations();
-    run.order(Order::Calibrate);
-    let end = std::time::Instant::now() + CALIBRATION_WAIT;
-    while std::time::Instant::now() < end {
-        run.wait(Duration::from_millis(50), |_| false)?;
-        if run.calibrations() > calibrations {
-            tell.say(format_args!("calibrated on the flat hand"));
-            return Ok(true);
-        }
-    }
-    Err(Failure::new(
-        "no complete frame came for the calibration",
-        "all 16 sensors plugged in, the hand flat and still",
-    )
-    .into())
 }
 
 /// Activates the gripper and waits until it is ready. Returns whether to go on.

@@ -2,18 +2,22 @@
 
 use anyhow::Result;
 use bridge::State;
+use bridge::clutch::Position;
 
 use super::Summary;
 use crate::failure::Failure;
 use crate::note;
-use crate::session::{Snapshot, Stopped};
+use crate::session::Snapshot;
 use crate::session_log::Written;
+use crate::stopped::Stopped;
 use crate::tell::Tell;
 
 /// How everything was when the run ended, before the clutch was opened.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ending {
     faulted: Option<State>,
+    /// The clutch had opened by itself, and nobody closed it again.
+    expired: bool,
     glove_answers: bool,
     gripper_answers: bool,
 }
@@ -23,6 +27,7 @@ impl Ending {
     pub(super) fn of(snapshot: &Snapshot) -> Self {
         Self {
             faulted: Some(snapshot.state).filter(|state| matches!(state, State::Faulted(_))),
+            expired: snapshot.clutch == Position::Expired,
             glove_answers: snapshot.glove_answers,
             gripper_answers: snapshot.gripper_answers,
         }
@@ -48,6 +53,13 @@ impl Ending {
             return Err(Failure::new(
                 "the glove no longer sends frames",
                 "its cable and power; `gauntlet doctor --glove PORT` with its port",
+            )
+            .into());
+        }
+        if self.expired {
+            return Err(Failure::new(
+                "the clutch opened by itself, for nobody kept it closed for 1 s; the gripper was held from then on",
+                "a terminal that shows the view, on a machine with less to do",
             )
             .into());
         }
@@ -148,6 +160,7 @@ mod tests {
 
     const WELL: Ending = Ending {
         faulted: None,
+        expired: false,
         glove_answers: true,
         gripper_answers: true,
     };
@@ -186,6 +199,13 @@ mod tests {
                     ..WELL
                 },
                 "fault",
+            ),
+            (
+                Ending {
+                    expired: true,
+                    ..WELL
+                },
+                "opened by itself",
             ),
             (
                 Ending {

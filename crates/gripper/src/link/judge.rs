@@ -1,6 +1,6 @@
 //! Whether the bytes received are the reply: length, CRC, then what the frame says.
 
-use super::{Echo, Error, Field, Link, Signature};
+use super::{Echo, Error, Field, Link, MOST_SHIFTED, Signature};
 use crate::Instant;
 use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
 
@@ -110,7 +110,7 @@ impl<S> Link<S> {
             return Verdict::More;
         };
         match Frame::new_checked(frame) {
-            Err(_) => return Verdict::Wrong(Error::Crc),
+            Err(_) => return shifted(bytes, pending.reply).unwrap_or(Verdict::Wrong(Error::Crc)),
             Ok(frame) => match (late, pending.check(&frame)) {
                 (None, Ok(())) => return Verdict::Reply,
                 (None, Err(field)) => return Verdict::Wrong(Error::Shape(field)),
@@ -156,6 +156,21 @@ impl<S> Link<S> {
         self.stripped = true;
         self.length == 0
     }
+}
+
+/// The reply behind a few bytes too many: where it begins like one, its end is waited for.
+fn shifted(bytes: &[u8], reply: Signature) -> Option<Verdict> {
+    let begins = |by: &u8| {
+        let head = bytes.get(usize::from(*by)..).and_then(<[u8]>::first_chunk);
+        head == Some(&reply.head)
+    };
+    let by = (1..=MOST_SHIFTED).find(begins)?;
+    let from = usize::from(by);
+    let Some(frame) = bytes.get(from..from + reply.length) else {
+        return Some(Verdict::More);
+    };
+    let good = Frame::new_checked(frame).is_ok();
+    good.then_some(Verdict::Wrong(Error::Shifted(by)))
 }
 
 /// A refusal in the first five bytes, if its own CRC fits.

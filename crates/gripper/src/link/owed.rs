@@ -74,6 +74,12 @@ impl Owed {
         self.0.retain(|entry| entry.until > now);
     }
 
+    /// Time stood still until `now`: what has not turned up may do so from now on.
+    pub(super) fn prolong(&mut self, now: Instant) {
+        let until = timing::after(now, timing::MEMORY);
+        self.0.iter_mut().for_each(|entry| entry.until = until);
+    }
+
     pub(super) fn debt(&self, signature: Signature) -> Debt {
         match self.0.iter().find(|entry| entry.signature == signature) {
             Some(entry) if entry.settled => Debt::Settled { until: entry.until },

@@ -266,7 +266,11 @@ fn next_command<const X: usize>(target: [u8; X], status: &Status<X>, axes: Axes)
         }
     });
     match axes {
-        Axes::Each => limits::keep_inside(wanted, &status.position, &target.map(f32::from)),
+        Axes::Each => {
+            // By now it may be as far as what it was told before.
+            let ceiling = core::array::from_fn(|axis| status.position[axis].max(status.echo[axis]));
+            limits::keep_inside(wanted, &ceiling, &status.position, &target.map(f32::from))
+        }
         // The mode keeps fingers and scissor apart.
         Axes::Fingers | Axes::Scissor => wanted,
     }
