@@ -18,7 +18,7 @@ use crate::failure::{Failure, OrFail};
 use crate::host_link::{Error, Heartbeat, HostLink};
 use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
-use crate::run::End;
+use crate::run::{End, clutch_expired};
 use crate::stats::{Percentiles, Rate, short_or_dash};
 use crate::stopped::Stopped;
 use crate::words;
@@ -139,11 +139,7 @@ impl Watched {
         if !self.expired {
             return Ok(());
         }
-        Err(Failure::new(
-            "the clutch opened by itself: no heartbeat reached the bridge for 1 s; the gripper was held from then on",
-            "the same on a machine with less to do, or over a shorter line",
-        )
-        .into())
+        Err(clutch_expired().into())
     }
 }
 

@@ -62,8 +62,6 @@ pub enum Sort {
     Note,
     /// Something is wrong.
     Fault,
-    /// A flat hand was taken as calibration.
-    Calibrated,
 }
 
 /// One thing to hand over.

@@ -25,7 +25,7 @@ use crate::session_log::SessionLog;
 use crate::{note, out};
 use shown::Shown;
 
-pub use ending::{Ending, Finished};
+pub use ending::{Ending, Finished, clutch_expired};
 pub use numbers::Numbers;
 pub use replies::Failed;
 pub use summary::Summary;
@@ -34,14 +34,14 @@ pub use summary::Summary;
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
 const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
+/// After this long the bridge has seen that the clutch was closed.
+const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
 /// Records of the bring-up that wait for the log, which is made after it: some 30 s.
 const EARLY: usize = 8192;
 /// By then whoever wrote beyond a file's limit was told.
 const FILE_LIMIT_TOLD: Duration = Duration::from_millis(300);
 /// For the hold before Ctrl-Z stops the program.
 const SUSPEND_HOLD: Duration = Duration::from_millis(500);
-/// After this long the bridge has seen that the clutch was closed.
-const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
 
 /// How a run goes.
 #[derive(Debug)]
@@ -83,6 +83,10 @@ pub struct Run {
     clutch: bool,
     /// When a person closed it last.
     engaged: Option<Instant>,
+    /// It opened by itself, and nobody touched it since.
+    expired: bool,
+    /// Somebody can press keys.
+    attended: bool,
     heartbeat: Option<Instant>,
     shown: Shown,
     /// The view was not taken for so long that nobody sees it.
@@ -113,6 +117,8 @@ impl Run {
             numbers: Numbers::default(),
             clutch: false,
             engaged: None,
+            expired: false,
+            attended: false,
             heartbeat: None,
             shown: Shown::default(),
             unseen: false,
@@ -194,7 +200,11 @@ impl Run {
     pub fn drive(&mut self, options: &Options) -> Result<End> {
         self.start_log()?;
         let driven = self.watch(options);
-        self.ending = self.session.snapshot().as_ref().map(Ending::of);
+        let unattended = self.expired && !self.attended;
+        self.ending = self
+            .session
+            .snapshot()
+            .map(|seen| Ending::of(&seen, unattended));
         driven
     }
 
@@ -224,6 +234,7 @@ impl Run {
                 self.obey(key);
             }
             let keys = live.interactive();
+            self.attended = keys;
             live.show(|| self.view(options, started.elapsed(), keys))
                 .or_fail(terminal, next)?;
             self.note_log_end(options.quiet);
@@ -247,8 +258,7 @@ impl Run {
 
     /// Opens the clutch, and waits until the hold has left.
     fn hold_for_a_while(&mut self) -> Result<()> {
-        self.clutch = false;
-        self.order(Order::Release);
+        self.release();
         let end = Instant::now() + SUSPEND_HOLD;
         let mut held = false;
         while !held && Instant::now() < end && !self.interrupt.sleep(ROUND) {
@@ -313,17 +323,12 @@ impl Run {
             Key::End => self.interrupt.ask(),
             Key::Clutch => {
                 if self.clutch {
-                    self.clutch = false;
-                    self.order(Order::Release);
+                    self.release();
                 } else {
                     self.engage();
                 }
             }
-            Key::Open if self.clutch => {
-                self.clutch = false;
-                self.order(Order::Release);
-            }
-            Key::Open => {}
+            Key::Open => self.release(),
             Key::Calibrate => self.order(Order::Calibrate(glove::timing::STILL_WAIT)),
         }
     }
@@ -331,22 +336,27 @@ impl Run {
     /// Closes the clutch: an act of a person.
     fn engage(&mut self) {
         let now = Instant::now();
-        (self.clutch, self.engaged, self.heartbeat) = (true, Some(now), Some(now));
+        (self.clutch, self.expired) = (true, false);
+        (self.engaged, self.heartbeat) = (Some(now), Some(now));
         self.order(Order::Engage);
     }
 
-    /// Sees that the clutch opened by itself. Returns whether it just did.
-    fn clutch_opened(&mut self) -> bool {
+    /// Opens the clutch, for a person.
+    fn release(&mut self) {
+        (self.clutch, self.expired) = (false, false);
+        self.order(Order::Release);
+    }
+
+    /// Sees that the clutch opened by itself.
+    fn look_at_clutch(&mut self) {
         let settled = self.engaged.is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
         let open = self
             .session
             .snapshot()
             .is_some_and(|seen| matches!(seen.clutch, Position::Open | Position::Expired));
-        let opened = self.clutch && settled && open;
-        if opened {
-            self.clutch = false;
+        if self.clutch && settled && open {
+            (self.clutch, self.expired) = (false, true);
         }
-        opened
     }
 
     /// What has to be done every few milliseconds.
@@ -364,8 +374,8 @@ impl Run {
             self.heartbeat = Some(now);
             self.order(Order::Heartbeat);
         }
+        self.look_at_clutch();
         self.look_at_file_limit();
-        self.clutch_opened();
         self.take_records();
         Ok(())
     }
@@ -470,9 +480,6 @@ impl Run {
             }
         }
         faults.extend(self.log_end());
-        if snapshot.is_some_and(|seen| seen.clutch == Position::Expired) {
-            faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
-        }
         if let Some(snapshot) = snapshot {
             let scheduling = self.session.scheduling();
             let now = Instant::now();

@@ -2,7 +2,6 @@
 
 use anyhow::Result;
 use bridge::State;
-use bridge::clutch::Position;
 
 use super::Summary;
 use crate::failure::Failure;
@@ -16,18 +15,18 @@ use crate::tell::Tell;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ending {
     faulted: Option<State>,
-    /// The clutch had opened by itself, and nobody closed it again.
-    expired: bool,
+    /// The clutch opened by itself, and nobody was there to see it.
+    unattended: bool,
     glove_answers: bool,
     gripper_answers: bool,
 }
 
 impl Ending {
     /// From what was known last.
-    pub(super) fn of(snapshot: &Snapshot) -> Self {
+    pub(super) fn of(snapshot: &Snapshot, unattended: bool) -> Self {
         Self {
+            unattended,
             faulted: Some(snapshot.state).filter(|state| matches!(state, State::Faulted(_))),
-            expired: snapshot.clutch == Position::Expired,
             glove_answers: snapshot.glove_answers,
             gripper_answers: snapshot.gripper_answers,
         }
@@ -41,6 +40,9 @@ impl Ending {
                 "`gauntlet gripper status --gripper PORT` with its port, which says what to do",
             )
             .into());
+        }
+        if self.unattended {
+            return Err(clutch_expired().into());
         }
         if !self.gripper_answers {
             return Err(Failure::new(
@@ -56,15 +58,16 @@ impl Ending {
             )
             .into());
         }
-        if self.expired {
-            return Err(Failure::new(
-                "the clutch opened by itself, for nobody kept it closed for 1 s; the gripper was held from then on",
-                "a terminal that shows the view, on a machine with less to do",
-            )
-            .into());
-        }
         Ok(())
     }
+}
+
+/// What a run is in which nobody saw that the clutch opened by itself.
+pub fn clutch_expired() -> Failure {
+    Failure::new(
+        "the clutch opened by itself, since no heartbeat came for 1 s; the gripper was held from then on",
+        "the same on a computer that neither sleeps nor has so much to do; on a terminal, space closes the clutch again",
+    )
 }
 
 /// What is left when a run is over.
@@ -160,7 +163,7 @@ mod tests {
 
     const WELL: Ending = Ending {
         faulted: None,
-        expired: false,
+        unattended: false,
         glove_answers: true,
         gripper_answers: true,
     };
@@ -202,17 +205,17 @@ mod tests {
             ),
             (
                 Ending {
-                    expired: true,
-                    ..WELL
-                },
-                "opened by itself",
-            ),
-            (
-                Ending {
                     glove_answers: false,
                     ..WELL
                 },
                 "glove",
+            ),
+            (
+                Ending {
+                    unattended: true,
+                    ..WELL
+                },
+                "opened by itself",
             ),
         ] {
             let run = finished(Ok(Stopped::Held), Some(ending), None);

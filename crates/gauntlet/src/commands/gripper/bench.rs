@@ -289,6 +289,10 @@ fn failed(
             format!("no {task}: the gripper is busy activating or changing its mode"),
             "again in a few seconds",
         ),
+        Why::NotTaken => Failure::new(
+            format!("no {task}: the gripper does not take the command, its registers stay what they were"),
+            "`gauntlet doctor --gripper …`, which names the register",
+        ),
         Why::Deadline => {
             let last = match last {
                 Some(gripper::Error::Link(error)) => format!("; last on the line: {error}"),
