@@ -16,6 +16,8 @@ pub struct Settings {
     pub unit: Option<u8>,
     /// Speed of a serial line, baud; 115200 as delivered.
     pub baud: Option<u32>,
+    /// How much longer than usual an answer is waited for.
+    pub patience: std::time::Duration,
 }
 
 /// The way to a gripper.

@@ -71,6 +71,16 @@ impl Model {
         }
     }
 
+    /// What the command line calls it.
+    pub fn option(self) -> &'static str {
+        match self {
+            Self::ThreeFinger => "3f",
+            Self::TwoFinger85 => "2f85",
+            Self::TwoFinger140 => "2f140",
+            Self::HandE => "hande",
+        }
+    }
+
     /// The 2-Finger or Hand-E model it is, if it is one.
     pub fn two_finger(self) -> Option<two_finger::Model> {
         match self {
@@ -137,6 +147,7 @@ impl Target {
         Settings {
             unit: self.unit,
             baud: self.baud,
+            ..Settings::default()
         }
     }
 }
