@@ -162,9 +162,9 @@ pub struct LineOptions {
     /// Speed of the gripper's serial line, if not 115200.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
     pub baud: Option<u32>,
-    /// Wait so many milliseconds longer for the gripper's answers (1 to 1000): for a tunnel that keeps them back.
-    #[arg(long, value_name = "MS", value_parser = clap::value_parser!(u64).range(1..=1_000))]
-    pub patience: Option<u64>,
+    /// Wait so much longer for the gripper's answers, milliseconds (1 to 1000): for a serial tunnel or a slow network.
+    #[arg(long, value_name = "MS", value_parser = crate::line::patience)]
+    pub patience: Option<Duration>,
 }
 
 impl LineOptions {
@@ -186,7 +186,7 @@ impl LineOptions {
         Ok(Settings {
             unit: self.unit,
             baud: self.baud,
-            patience: Duration::from_millis(self.patience.unwrap_or(0)),
+            patience: self.patience,
         })
     }
 }

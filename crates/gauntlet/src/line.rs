@@ -1,6 +1,7 @@
 //! A gripper's line: a serial port, or Modbus TCP. The driver does not care which.
 
 use std::path::Path;
+use std::time::Duration;
 
 use anyhow::Result;
 
@@ -14,10 +15,34 @@ use crate::tcp;
 pub struct Settings {
     /// Modbus unit; 9 on a serial line and 2 over TCP as delivered.
     pub unit: Option<u8>,
-    /// Speed of a serial line, baud; 115200 as delivered.
+    /// Speed of a serial line, baud; 115200 as delivered. A TCP line has none.
     pub baud: Option<u32>,
-    /// How much longer than usual an answer is waited for.
-    pub patience: std::time::Duration,
+    /// By how much longer than usual an answer is waited for (`--patience`): a serial tunnel, a slow network.
+    pub patience: Option<Duration>,
+}
+
+/// Longest `--patience`: a late answer is told from the next one's for two seconds.
+pub const MOST_PATIENCE: Duration = Duration::from_millis(1_000);
+
+/// A `--patience` in milliseconds, for a command line: 1 to 1000.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn patience(text: &str) -> Result<Duration, String> {
+    let most = MOST_PATIENCE.as_millis();
+    match text.parse::<u16>() {
+        Ok(millis) if (1..=most).contains(&u128::from(millis)) => {
+            Ok(Duration::from_millis(millis.into()))
+        }
+        _ => Err(format!("a whole number of milliseconds from 1 to {most}")),
+    }
+}
+
+impl Settings {
+    /// The patience asked for; none where it was not.
+    pub fn patience(&self) -> Duration {
+        self.patience.unwrap_or(Duration::ZERO).min(MOST_PATIENCE)
+    }
 }
 
 /// The way to a gripper.
@@ -33,12 +58,26 @@ impl Line {
     /// Opens `path`: a serial port's path, or `tcp:HOST[:PORT]`. Nothing is asked of the gripper.
     ///
     /// # Errors
-    /// A failure that says why it does not open.
+    /// A failure that says why it does not open, or that a speed was given to a line without one.
     pub fn open(path: &Path, settings: Settings, interrupt: &Interrupt) -> Result<Self> {
         Ok(match tcp::Address::parse(path)? {
             Some(address) => {
+                if let Some(baud) = settings.baud {
+                    return Err(Failure::usage(
+                        format!(
+                            "--baud {baud}: {address} is a network address, which has no baud rate"
+                        ),
+                        "the same without --baud",
+                    )
+                    .into());
+                }
                 let unit = settings.unit.unwrap_or(tcp::UNIT);
-                Self::Tcp(tcp::Port::connect(&address, unit, interrupt)?)
+                Self::Tcp(tcp::Port::connect_with(
+                    &address,
+                    unit,
+                    settings.patience(),
+                    interrupt,
+                )?)
             }
             None => {
                 let baud = settings.baud.unwrap_or(BAUD);
@@ -61,6 +100,7 @@ impl Line {
         gripper::driver::Config {
             unit: settings.unit.unwrap_or(usual.unit),
             baud: settings.baud.unwrap_or(BAUD),
+            patience: ticks(settings.patience()),
             ..usual
         }
     }
@@ -80,6 +120,11 @@ impl Line {
             Self::Tcp(port) => port.watch(),
         }
     }
+}
+
+/// A span of time as the drivers have it.
+pub(crate) fn ticks(span: Duration) -> gripper::Duration {
+    gripper::Duration::from_ticks(u64::try_from(span.as_micros()).unwrap_or(u64::MAX))
 }
 
 /// A line's failure.

@@ -52,7 +52,7 @@ pub enum Error {
     #[error("not connected")]
     NotConnected,
     /// No whole answer in time.
-    #[error("connected, but no answer within {} ms", EXCHANGE.as_millis())]
+    #[error("connected, but no answer in time ({} ms and what --patience adds): it is slow, another unit, or serves one client only and another is connected", EXCHANGE.as_millis())]
     Timeout,
     /// The other side ended the connection.
     #[error("the other side closed the connection")]
@@ -66,6 +66,16 @@ pub enum Error {
     /// A valid frame that does not answer the request.
     #[error("a valid frame does not answer the request ({0})")]
     Mismatch(String),
+    /// The answer bears another transaction number than the request.
+    #[error(
+        "the server keeps no transaction numbers: it answers request {asked} with number {answered}, and which answer is whose cannot be told"
+    )]
+    Unnumbered {
+        /// The request's.
+        asked: u16,
+        /// The answer's.
+        answered: u16,
+    },
     /// The gripper, or a gateway before it, says no.
     #[error("the device refuses with exception {0:02X}")]
     Exception(u8),
@@ -88,7 +98,12 @@ impl Error {
             Self::Unreachable | Self::System(_) => {
                 "`ping` the gripper; its power, the network cable, and that the PC has an address in the same network"
             }
-            Self::Timeout => "--unit: another unit number (2 by default); the gripper's power",
+            Self::Timeout => {
+                "ending other programs that are connected to it; the same with --patience 500; --unit with another unit number (2 by default); the gripper's power"
+            }
+            Self::Unnumbered { .. } => {
+                "a gateway that repeats transaction numbers, as Modbus TCP demands, or the gripper's serial port"
+            }
             Self::NotConnected | Self::Closed | Self::Cut => {
                 "ending other programs that are connected to the gripper, then again"
             }
@@ -108,7 +123,9 @@ impl embedded_io::Error for Error {
             Self::Refused => ErrorKind::ConnectionRefused,
             Self::Unreachable | Self::Timeout => ErrorKind::TimedOut,
             Self::Closed | Self::Cut => ErrorKind::ConnectionReset,
-            Self::Malformed(_) | Self::Mismatch(_) => ErrorKind::InvalidData,
+            Self::Malformed(_) | Self::Mismatch(_) | Self::Unnumbered { .. } => {
+                ErrorKind::InvalidData
+            }
             Self::Unsupported => ErrorKind::Unsupported,
             Self::Exception(_) | Self::System(_) => ErrorKind::Other,
         }

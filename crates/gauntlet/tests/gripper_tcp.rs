@@ -297,7 +297,7 @@ fn frames_that_do_not_answer_are_typed_errors() {
     type Make = Box<dyn Fn([u8; 2]) -> Vec<u8> + Send>;
     let cases: Vec<(&str, Make)> = vec![
         (
-            "mismatch",
+            "unnumbered",
             Box::new(move |id| frame([id[0] ^ 0x55, id[1]], UNIT, &words(8))),
         ),
         ("mismatch", Box::new(move |id| frame(id, 9, &words(8)))),
@@ -322,6 +322,10 @@ fn frames_that_do_not_answer_are_typed_errors() {
         let right = match kind {
             "mismatch" => matches!(error, Some(Error::Mismatch(_))),
             "exception" => error == Some(Error::Exception(2)),
+            "unnumbered" => matches!(
+                error,
+                Some(Error::Unnumbered { asked, answered }) if asked ^ answered == 0x5500
+            ),
             _ => matches!(error, Some(Error::Malformed(_))),
         };
         assert!(right, "{kind}: {error:?}");

@@ -9,6 +9,7 @@
 //! | [`registers`] | every field of the command and status blocks as types; faults in words |
 //! | [`driver`] | grippers as split-phase state machines behind the [`Gripper`] trait |
 //! | [`space`] | where the four axes may be without the fingers meeting |
+//! | [`travel`] | whether an axis can have moved as far as its position says |
 //!
 //! Nothing here blocks, reads a clock or allocates: time and the port are arguments, a step does
 //! what can be done now. A gripper moves only when it is told to: connecting reads, and never
@@ -22,6 +23,7 @@ pub mod registers;
 pub mod rtu;
 pub mod space;
 pub mod timing;
+pub mod travel;
 
 pub use driver::Error;
 pub use registers::Fault;
@@ -73,7 +75,8 @@ pub enum Activation {
 /// What a gripper said about itself in one reply.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Status<const X: usize> {
-    /// When the reply was complete.
+    /// When the request it answers was sent: the gripper said this then or later. However long the
+    /// reply lay in a buffer, the status is never taken for younger than it is.
     pub stamp: Instant,
     /// Whether it can move.
     pub activation: Activation,

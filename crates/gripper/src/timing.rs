@@ -13,6 +13,9 @@
 //!                             + quarantine: longest reply 1.82 + silence 1.75 → next request at 14.2 ms
 //! an answer in pieces           10.6 ms to its start + 21 × (86.8 µs + PAUSE 750 µs) = 28.2 ms at most
 //! ```
+//!
+//! A line that is known to be slow (a serial tunnel) can be given patience: both the start of a reply
+//! and its end may then come later by that much, and a motion may rest on a status older by it.
 
 use crate::{Duration, Instant};
 
@@ -63,6 +66,10 @@ pub const MODE_CHANGE: Duration = Duration::from_millis(15_000);
 
 /// Longest automatic release: a slow full opening.
 pub const RELEASE: Duration = Duration::from_millis(60_000);
+
+/// How long a gripper that answers may leave what it was told unrepeated before that is an error: it
+/// repeats its registers within two refreshes.
+pub const TAKEN: Duration = Duration::from_millis(1_500);
 
 /// Longest reset: rACT cleared and seen cleared, with a few requests lost.
 pub const RESET: Duration = Duration::from_millis(2_000);

@@ -70,7 +70,7 @@ fn the_link_holds_its_rules_under_any_operations() {
     for data in corpus("link") {
         fuzz::link(&data);
     }
-    for _ in 0..6_000 {
+    for _ in 0..8_000 {
         let seen = fuzz::link(&random(&mut rng, 800));
         all.answers += seen.answers;
         all.failures += seen.failures;

@@ -293,3 +293,49 @@ fn the_trace_tells_what_happened_last() {
     assert_eq!(events, [Event::Sent, Event::Received, Event::Sent, failed]);
     assert_eq!(bench.link.trace().iter().last().unwrap().bytes, [1, 2]);
 }
+
+#[test]
+fn a_good_reply_behind_a_few_extra_bytes_is_named_and_not_taken() {
+    for (request, reply) in [(read(8), status(8)), (exchange(8), exchanged())] {
+        for extra in [&[0][..], &[0xFF], &[0, 0], &[0x80, 0, 0]] {
+            let mut bench = Bench::new();
+            let shifted = [extra, &reply].concat();
+            assert_eq!(
+                bench.ask(request, &shifted, CHARACTER),
+                Err(Error::Shifted(extra.len() as u8))
+            );
+        }
+        // One bit of it wrong: no good reply stands there.
+        let mut broken = [&[0][..], &reply].concat();
+        broken[9] ^= 4;
+        let mut bench = Bench::new();
+        assert_eq!(bench.ask(request, &broken, CHARACTER), Err(Error::Crc));
+    }
+}
+
+#[test]
+fn with_patience_a_reply_may_start_and_end_later_and_without_it_may_not() {
+    let patient = |millis| Config {
+        patience: gripper::Duration::from_millis(millis),
+        ..Config::new(9, 115_200)
+    };
+    // 60 ms late; and pieces with 20 ms between them.
+    for (delay, pieces) in [(60_000, 1), (2_000, 3)] {
+        for (millis, taken) in [(0, false), (100, true)] {
+            let line = Line::default();
+            let mut link = Link::new(line.clone(), patient(millis));
+            settle(&line, &mut link);
+            let asked = line.now();
+            link.start(&read(8), RESERVED, at(asked)).unwrap();
+            for (k, piece) in status(8).chunks(21usize.div_ceil(pieces)).enumerate() {
+                line.send(asked + delay + 20_000 * k as u64, CHARACTER, piece);
+            }
+            let heard = run_link(&line, &mut link, asked + 1_000_000, &mut |_, _, _| {});
+            let good = matches!(heard, Some(Ok(_)));
+            assert_eq!(
+                good, taken,
+                "{delay} µs, {pieces} pieces, {millis} ms: {heard:?}"
+            );
+        }
+    }
+}

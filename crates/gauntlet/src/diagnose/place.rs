@@ -8,7 +8,7 @@ use gripper::timing;
 
 use super::search::UNIT;
 use crate::commands::gripper::Model;
-use crate::line::Settings;
+use crate::line::{MOST_PATIENCE, Settings};
 use crate::port::BAUD;
 use crate::tcp;
 
@@ -53,12 +53,12 @@ impl Place<'_> {
         } else {
             Duration::from_micros(timing::RESPONSE_PC.as_micros())
         };
-        usual + self.asked.settings.patience
+        usual + self.asked.settings.patience()
     }
 
     /// The same place, asked with this patience.
     pub fn with_patience(mut self, patience: Duration) -> Self {
-        self.asked.settings.patience = patience;
+        self.asked.settings.patience = Some(patience.min(MOST_PATIENCE));
         self
     }
 
@@ -106,8 +106,8 @@ impl Place<'_> {
         if let Some(model) = special {
             words.push_str(&format!(" --gripper-model {}", model.option()));
         }
-        if !settings.patience.is_zero() {
-            words.push_str(&format!(" --patience {}", settings.patience.as_millis()));
+        if let Some(patience) = settings.patience {
+            words.push_str(&format!(" --patience {}", patience.as_millis()));
         }
         words
     }

@@ -17,6 +17,8 @@ use super::task::{self, Answers, Done, Job};
 use super::{Address, BLOCK, CONNECT, EXCHANGE, Error, State, lock};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
+use crate::line::ticks;
+use crate::platform::Clock;
 use crate::port::Watch;
 
 /// Answers that may lie there; more than one only after the driver gave up waiting.
@@ -44,6 +46,9 @@ pub struct Port {
     state: Arc<Mutex<State>>,
     watch: Watch,
     readable: Arc<OwnedFd>,
+    clock: Clock,
+    /// By how much longer than [`EXCHANGE`] an exchange may take.
+    patience: Duration,
     number: u64,
     asked: Option<Asked>,
     /// The answer in RTU's bytes, and how many of them were read.
@@ -57,7 +62,20 @@ impl Port {
     /// # Errors
     /// A failure that says why there is no connection, after [`CONNECT`] at most.
     pub fn connect(address: &Address, unit: u8, interrupt: &Interrupt) -> anyhow::Result<Self> {
-        let port = Self::start(address, unit).or_fail(
+        Self::connect_with(address, unit, Duration::ZERO, interrupt)
+    }
+
+    /// The same, where an exchange may take longer than [`EXCHANGE`] by `patience`.
+    ///
+    /// # Errors
+    /// As [`Self::connect`].
+    pub fn connect_with(
+        address: &Address,
+        unit: u8,
+        patience: Duration,
+        interrupt: &Interrupt,
+    ) -> anyhow::Result<Self> {
+        let port = Self::start(address, unit, patience).or_fail(
             || format!("{address} cannot be used"),
             "ending other programs",
         )?;
@@ -76,7 +94,8 @@ impl Port {
     }
 
     /// Starts the task; it connects by itself.
-    fn start(address: &Address, unit: u8) -> std::io::Result<Self> {
+    fn start(address: &Address, unit: u8, patience: Duration) -> std::io::Result<Self> {
+        let clock = Clock::start();
         let (jobs, queue) = mpsc::channel(1);
         let (back, answers) = sync_channel(ANSWERS);
         let (wake, waker) = UnixStream::pair()?;
@@ -91,6 +110,7 @@ impl Port {
             queue: back,
             wake: waker,
             state: Arc::clone(&state),
+            clock,
         };
         let target = address.clone();
         std::thread::Builder::new()
@@ -111,6 +131,8 @@ impl Port {
             state,
             watch,
             readable,
+            clock,
+            patience,
             number: 0,
             asked: None,
             reply: Vec::new(),
@@ -127,6 +149,7 @@ impl Port {
             baud: 1_000_000,
             response: gripper::Duration::from_ticks((millis + 50) * 1_000),
             silence: Some(gripper::Duration::from_ticks(100)),
+            patience: ticks(self.patience),
             // Only the 3-Finger gripper speaks Modbus TCP.
             check_family: false,
             ..gripper::driver::Config::default()
@@ -250,7 +273,7 @@ impl Write for Port {
         let job = Job {
             number: self.number,
             write,
-            until: Instant::now() + EXCHANGE,
+            until: self.clock.now() + ticks(EXCHANGE + self.patience),
         };
         // The queue is full only while the task is stuck in an exchange the driver gave up.
         self.jobs.try_send(job).map_err(|_| Error::NotConnected)?;

@@ -3,14 +3,14 @@
 
 use std::io::Result;
 use std::pin::Pin;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex};
 use std::task::{Context, Poll};
 
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 
-use super::Error;
+use super::{Error, lock};
 
 /// What came over a stream.
 #[derive(Debug, Default)]
@@ -18,12 +18,42 @@ pub(super) struct Seen {
     /// Bytes since the request.
     bytes: AtomicUsize,
     ended: AtomicBool,
+    /// The first two bytes of the request and of what came after it: their transaction numbers.
+    numbers: Mutex<[Head; 2]>,
+}
+
+/// The first two bytes of a frame, as far as they have passed.
+#[derive(Debug, Default, Clone, Copy)]
+struct Head([u8; 2], usize);
+
+impl Head {
+    fn take(&mut self, bytes: &[u8]) {
+        for byte in bytes {
+            let Some(slot) = self.0.get_mut(self.1) else {
+                return;
+            };
+            *slot = *byte;
+            self.1 += 1;
+        }
+    }
+
+    fn number(self) -> Option<u16> {
+        (self.1 == 2).then(|| u16::from_be_bytes(self.0))
+    }
 }
 
 impl Seen {
     /// A request is about to leave.
     pub(super) fn begin(&self) {
         self.bytes.store(0, Ordering::Relaxed);
+        *lock(&self.numbers) = Default::default();
+    }
+
+    /// The transaction numbers of request and answer, where they differ.
+    pub(super) fn other_number(&self) -> Option<Error> {
+        let [asked, answered] = lock(&self.numbers).map(Head::number);
+        let (asked, answered) = (asked?, answered?);
+        (asked != answered).then_some(Error::Unnumbered { asked, answered })
     }
 
     /// How the stream ended, if the other side ended it.
@@ -65,6 +95,8 @@ impl AsyncRead for Watched {
         if matches!(read, Poll::Ready(Ok(()))) {
             let count = room.filled().len() - before;
             self.seen.bytes.fetch_add(count, Ordering::Relaxed);
+            let came = room.filled().get(before..).unwrap_or(&[]);
+            lock(&self.seen.numbers)[1].take(came);
             if count == 0 && room.remaining() > 0 {
                 self.seen.ended.store(true, Ordering::Relaxed);
             }
@@ -79,7 +111,11 @@ impl AsyncWrite for Watched {
         context: &mut Context<'_>,
         bytes: &[u8],
     ) -> Poll<Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
+        let written = Pin::new(&mut self.stream).poll_write(context, bytes);
+        if let Poll::Ready(Ok(count)) = written {
+            lock(&self.seen.numbers)[0].take(bytes.get(..count).unwrap_or(&[]));
+        }
+        written
     }
 
     fn poll_flush(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<Result<()>> {

@@ -9,11 +9,13 @@ use std::time::Duration;
 use gripper::registers::{COMMAND, STATUS};
 use tokio::net::{TcpStream, lookup_host};
 use tokio::sync::mpsc;
-use tokio::time::{Instant, timeout, timeout_at};
+use tokio::time::timeout;
 use tokio_modbus::client::{Client, Context, tcp::attach_slave};
 use tokio_modbus::{Request, Response, Slave};
 
 use super::stream::{Seen, Watched};
+use crate::platform::Clock;
+
 use super::{Address, BLOCK, CONNECT, Error, RECONNECT_FIRST, RECONNECT_LAST, State, lock};
 
 /// Registers of a block.
@@ -25,8 +27,8 @@ pub(super) struct Job {
     pub(super) number: u64,
     /// The command block to write first.
     pub(super) write: Option<[u8; BLOCK]>,
-    /// Nothing of it happens after this.
-    pub(super) until: std::time::Instant,
+    /// Nothing of it happens after this, and what was answered later is not told: the tool's clock.
+    pub(super) until: gripper::Instant,
 }
 
 /// What became of it: the status block.
@@ -38,6 +40,8 @@ pub(super) struct Answers {
     /// Wakes whoever waits for an answer.
     pub(super) wake: UnixStream,
     pub(super) state: Arc<Mutex<State>>,
+    /// What [`Job::until`] is counted by. Not tokio's: that one may stand still with the machine.
+    pub(super) clock: Clock,
 }
 
 impl Answers {
@@ -149,17 +153,22 @@ async fn serve(
 ) -> (bool, bool) {
     let mut exchanged = false;
     while let Some(job) = jobs.recv().await {
-        let until = Instant::from_std(job.until);
-        let result = if until <= Instant::now() {
+        let timer = Timer {
+            clock: answers.clock,
+            until: job.until,
+        };
+        let Some(left) = timer.left() else {
             // It waited in the queue for too long; the connection is not at fault.
             answers.give(job.number, Err(Error::Timeout));
             continue;
-        } else {
-            let exchange = exchange(&mut connection, job.write.as_ref());
-            timeout_at(until, exchange)
-                .await
-                .unwrap_or(Err(Error::Timeout))
         };
+        let exchange = exchange(&mut connection, job.write.as_ref(), &timer);
+        let result = timeout(left, exchange)
+            .await
+            .ok()
+            // What a timeout finds done is done, however late: this process may have stood still.
+            .filter(|_| timer.left().is_some())
+            .unwrap_or(Err(Error::Timeout));
         let lost = !matches!(result, Ok(_) | Err(Error::Exception(_)));
         exchanged |= result.is_ok();
         if lost {
@@ -175,10 +184,25 @@ async fn serve(
     (exchanged, false)
 }
 
+/// The time of one exchange.
+struct Timer {
+    clock: Clock,
+    until: gripper::Instant,
+}
+
+impl Timer {
+    /// What is left of it.
+    fn left(&self) -> Option<Duration> {
+        let left = self.until.checked_duration_since(self.clock.now())?;
+        (left.as_ticks() > 0).then(|| Duration::from_micros(left.as_ticks()))
+    }
+}
+
 /// Writes the command block, if there is one, and reads the status block.
 async fn exchange(
     connection: &mut Connection,
     write: Option<&[u8; BLOCK]>,
+    timer: &Timer,
 ) -> Result<[u8; BLOCK], Error> {
     if let Some(block) = write {
         let words: Vec<u16> = block
@@ -186,13 +210,13 @@ async fn exchange(
             .map(|pair| u16::from_be_bytes([pair[0], pair[1]]))
             .collect();
         let request = Request::WriteMultipleRegisters(COMMAND, words.into());
-        match call(connection, request).await? {
+        match call(connection, request, timer).await? {
             Response::WriteMultipleRegisters(COMMAND, REGISTERS) => {}
             other => return Err(mismatch(&other)),
         }
     }
     let request = Request::ReadInputRegisters(STATUS, REGISTERS);
-    let words = match call(connection, request).await? {
+    let words = match call(connection, request, timer).await? {
         Response::ReadInputRegisters(words) if words.len() == BLOCK / 2 => words,
         other => return Err(mismatch(&other)),
     };
@@ -215,14 +239,23 @@ fn mismatch(response: &Response) -> Error {
     })
 }
 
-async fn call(connection: &mut Connection, request: Request<'_>) -> Result<Response, Error> {
+async fn call(
+    connection: &mut Connection,
+    request: Request<'_>,
+    timer: &Timer,
+) -> Result<Response, Error> {
     use tokio_modbus::{Error as Modbus, ProtocolError};
+    // Nothing is asked, and nothing written, that would be too late.
+    if timer.left().is_none() {
+        return Err(Error::Timeout);
+    }
     connection.seen.begin();
     match connection.context.call(request).await {
         Ok(Ok(response)) => Ok(response),
         Ok(Err(exception)) => Err(Error::Exception(exception.into())),
         Err(Modbus::Protocol(ProtocolError::HeaderMismatch { message, .. })) => {
-            Err(Error::Mismatch(message))
+            let other = connection.seen.other_number();
+            Err(other.unwrap_or(Error::Mismatch(message)))
         }
         Err(Modbus::Protocol(ProtocolError::FunctionCodeMismatch { request, .. })) => Err(
             Error::Mismatch(format!("another function than {}", request.value())),

@@ -1,12 +1,12 @@
 //! One cycle after the other: what goes out next, and what to make of what comes back.
 
-use super::family::{Block, Family, may_move};
+use super::family::{Block, Family, Snapshot, may_move};
 use super::task::Stage;
 use super::{Driver, Error};
 use crate::link::{self, Debt, Field, Refused};
 use crate::registers::{COMMAND, Kind, STATUS};
 use crate::rtu::{Registers, Request, Response, function};
-use crate::{Instant, Motion, Status, timing};
+use crate::{Duration, Instant, Motion, Status, timing};
 use embedded_io::{Read, ReadReady, Write};
 
 /// The request under way.
@@ -20,6 +20,8 @@ pub(super) struct Doing<const X: usize> {
     block: Block,
     /// The motion in it.
     motion: Option<Motion<X>>,
+    /// When it left: what the answer says is counted from here.
+    sent: Instant,
 }
 
 impl<const X: usize> Doing<X> {
@@ -29,6 +31,7 @@ impl<const X: usize> Doing<X> {
             quantity,
             block: Block::default(),
             motion: None,
+            sent: Instant::from_ticks(0),
         }
     }
 
@@ -147,7 +150,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 self.verify = true;
                 if self.misses >= timing::PATIENCE {
                     let spacing = timing::MEMORY.as_ticks() / F::READS.len().max(1) as u64;
-                    let spacing = crate::Duration::from_ticks(spacing);
+                    let spacing = Duration::from_ticks(spacing);
                     self.next_start = timing::after(self.next_start, spacing);
                 }
             }
@@ -188,7 +191,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
         let judged = self
             .family
-            .decode(block, now, self.config.check_reserved)
+            .decode(block, doing.sent, self.config.check_reserved)
             .and_then(|snapshot| {
                 if self.running.is_some() {
                     self.echo.take(snapshot.echo);
@@ -214,7 +217,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
         self.snapshot = Some(snapshot);
         self.verify = false;
-        self.step_task(&snapshot)?;
+        self.step_task(&snapshot, now)?;
         Ok(snapshot.status)
     }
 
@@ -263,14 +266,37 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             }
         }
         self.next_start = timing::after(now, self.config.cycle.max(timing::CYCLE));
-        self.doing = Some(doing);
+        self.doing = Some(Doing { sent: now, ..doing });
         Ok(())
+    }
+
+    /// How old the status may be that a write rests on: as old as a motion, and the time bytes take.
+    fn fresh(&self) -> Duration {
+        let bytes = link::MAX_REQUEST + link::MAX_REPLY;
+        let line = timing::characters(bytes, self.config.baud).as_ticks();
+        let most = timing::STALE_MOTION.as_ticks() + line;
+        Duration::from_ticks(most.saturating_add(2 * self.config.patience.as_ticks()))
+    }
+
+    /// Time between polls that the driver did not ask for: the process stood still, or the machine
+    /// slept. What it knew of the line and the gripper is of then.
+    pub(super) fn note_gap(&mut self, now: Instant) {
+        let Some(due) = self.due else {
+            return;
+        };
+        if timing::since(now, due) > self.link.config().longest_exchange() {
+            self.link.resume(now);
+            self.verify = true;
+        }
     }
 
     /// What should go out: a task's write, a motion, or a read.
     fn wanted(&self, now: Instant) -> Doing<X> {
         let read = Doing::read((function::READ_HOLDING, F::REGISTERS));
-        let Some(before) = self.snapshot.filter(|_| !self.verify) else {
+        let known = |before: &Snapshot<X>| {
+            !self.verify && timing::since(now, before.status.stamp) <= self.fresh()
+        };
+        let Some(before) = self.snapshot.filter(known) else {
             return read;
         };
         let write = |block, motion| Doing {
@@ -278,6 +304,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             quantity: F::REGISTERS,
             block,
             motion,
+            sent: now,
         };
         match self.running.map(|running| running.stage) {
             Some(Stage::Write(action)) => write(self.family.action(action, &before), None),

@@ -10,6 +10,9 @@
 //!   the rACT in a motion for an activation, and move.
 //! - **No write before the family is known.** A command for a 2-Finger gripper moves a 3-Finger one
 //!   too; reads tell the two apart, and a gripper of the other family is an error.
+//! - **No write rests on what was read before a gap.** Where nobody polled for longer than an exchange
+//!   takes, what lies in the port is thrown away and the status read anew first. A status is as old as
+//!   its request, and none older than 100 ms (and the line's own time) is written upon.
 //! - A motion goes out as one FC23 that writes the command block and reads the status block, at
 //!   most every 5 ms, and never when its stamp is older than 100 ms.
 //! - rMOD keeps what the gripper reports; rATR is not cleared under a release.
@@ -50,6 +53,9 @@ pub struct Config {
     pub silence: Option<Duration>,
     /// Least time from one request to the next, not below [`timing::CYCLE`].
     pub cycle: Duration,
+    /// By how much later than that an answer may start, and end; usually nothing. Asked for by a person
+    /// whose line is known to be slow: what a motion rests on may then be older by as much.
+    pub patience: Duration,
     /// Whether a set reserved bit makes a status invalid. On, unless a gripper's firmware sets one.
     pub check_reserved: bool,
     /// Whether a gripper of the other family is refused. On, unless a gripper's firmware answers
@@ -65,6 +71,7 @@ impl Default for Config {
             response: timing::RESPONSE,
             silence: None,
             cycle: timing::CYCLE,
+            patience: Duration::from_ticks(0),
             check_reserved: true,
             check_family: true,
         }
@@ -89,6 +96,7 @@ impl Config {
             response: self.response,
             silence,
             longest_reply,
+            patience: self.patience,
         }
     }
 }
@@ -161,6 +169,8 @@ pub struct Driver<S, F, const X: usize> {
     /// Late replies seen so far.
     stale: u32,
     next_start: Instant,
+    /// When the next poll should come at the latest, or the newest one came.
+    due: Option<Instant>,
     running: Option<Running>,
     outcome: Option<(Task, Outcome)>,
     identity: Identity,
@@ -236,10 +246,26 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             misses: 0,
             stale: 0,
             next_start: Instant::from_ticks(0),
+            due: None,
             running: None,
             outcome: None,
             identity: Identity::new(!config.check_family),
         }
+    }
+
+    fn step(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
+        let heard = self.hear(now);
+        self.note_late(now);
+        if heard.is_some() {
+            return heard;
+        }
+        if let Some(error) = self.overdue(now) {
+            return Some(Err(error));
+        }
+        if self.doing.is_none() && now >= self.next_start && self.link.is_free(now) {
+            return self.begin(now).err().map(Err);
+        }
+        None
     }
 
     /// From now on an axis may follow another's position again.
@@ -322,18 +348,10 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Gripper<X> for D
     type Error = Error;
 
     fn poll(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
-        let heard = self.hear(now);
-        self.note_late(now);
-        if heard.is_some() {
-            return heard;
-        }
-        if let Some(error) = self.overdue(now) {
-            return Some(Err(error));
-        }
-        if self.doing.is_none() && now >= self.next_start && self.link.is_free(now) {
-            return self.begin(now).err().map(Err);
-        }
-        None
+        self.note_gap(now);
+        let outcome = self.step(now);
+        self.due = Some(self.next_due().max(now));
+        outcome
     }
 
     fn set_motion(&mut self, motion: Option<Motion<X>>, stamp: Instant) {

@@ -61,6 +61,9 @@ pub enum Outcome {
 pub enum Failure {
     /// The gripper did not say "done" in time.
     Deadline,
+    /// The gripper answers, but its status does not show what was written: its registers read back
+    /// otherwise.
+    NotTaken,
     /// The gripper is not ready for it: activate it first, or wait for what it is busy with.
     NotReady(Activation),
     /// The gripper reports a fault.
@@ -73,6 +76,10 @@ impl core::fmt::Display for Failure {
             Self::Deadline => write!(
                 f,
                 "the gripper did not finish in time; read its status, clear its way, try again"
+            ),
+            Self::NotTaken => write!(
+                f,
+                "the gripper answers but does not take what is written: its status reads back otherwise; look for another program or a gateway that writes to it"
             ),
             Self::NotReady(Activation::Reset) => {
                 write!(f, "the gripper is not activated; activate it first")
@@ -106,6 +113,25 @@ pub(super) struct Running {
     pub(super) deadline: Option<Instant>,
     /// Statuses in a row that said "ready" since the mode was written.
     calm: u8,
+    /// Since when statuses came that do not show what is being written.
+    untaken: Option<(Action, Instant)>,
+}
+
+impl Running {
+    /// For how long the gripper has not shown what is being written.
+    fn goes_untaken(&mut self, now: Instant) -> Duration {
+        let Stage::Write(action) = self.stage else {
+            self.untaken = None;
+            return Duration::from_ticks(0);
+        };
+        match self.untaken {
+            Some((same, since)) if same == action => timing::since(now, since),
+            _ => {
+                self.untaken = Some((action, now));
+                Duration::from_ticks(0)
+            }
+        }
+    }
 }
 
 /// Statuses in a row that must agree before an unchanged mode counts as changed: the registers lag
@@ -129,6 +155,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             stage: Stage::Look,
             deadline: None,
             calm: 0,
+            untaken: None,
         });
     }
 
@@ -155,7 +182,9 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
     }
 
     /// Moves the task on after a status that was believed.
-    pub(super) fn step_task(&mut self, snapshot: &Snapshot<X>) -> Result<(), Error> {
+    pub(super) fn step_task(&mut self, snapshot: &Snapshot<X>, now: Instant) -> Result<(), Error> {
+        let patience = self.config.patience.as_ticks().saturating_mul(4);
+        let taken = timing::TAKEN.as_ticks().saturating_add(patience);
         let Some(running) = &mut self.running else {
             return Ok(());
         };
@@ -166,7 +195,12 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             Task::Mode(mode) => mode_change(running, mode, snapshot),
         };
         match next {
-            Next::Stay(stage) => running.stage = stage,
+            Next::Stay(stage) => {
+                running.stage = stage;
+                if running.goes_untaken(now) > Duration::from_ticks(taken) {
+                    return Err(self.fail_task(Failure::NotTaken));
+                }
+            }
             Next::Done => {
                 self.outcome = Some((running.task, Outcome::Done));
                 self.running = None;

@@ -1,8 +1,8 @@
 //! Whether the bytes received are the reply: length, CRC, then what the frame says.
 
-use super::{Echo, Error, Field, Link, Signature};
-use crate::Instant;
+use super::{Echo, Error, Field, Link, MOST_SHIFTED, Signature};
 use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
+use crate::{Instant, timing};
 
 /// What the transaction under way expects.
 #[derive(Clone, Copy, Debug)]
@@ -92,13 +92,13 @@ impl Pending {
 
 impl<S> Link<S> {
     /// Judges what has been received, after taking an adapter's echo off its front.
-    pub(super) fn judge(&mut self, pending: &Pending) -> Verdict {
+    pub(super) fn judge(&mut self, pending: &Pending, now: Instant) -> Verdict {
         if self.strip_echo(pending) {
             return Verdict::More;
         }
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
         if let Some(owed) = self.owed.late_exception(bytes) {
-            self.owed.pay(owed);
+            self.note_late(owed, now);
             return Verdict::Wrong(Error::Stale);
         }
         if let Some(verdict) = exception(bytes, pending) {
@@ -110,14 +110,23 @@ impl<S> Link<S> {
             return Verdict::More;
         };
         match Frame::new_checked(frame) {
-            Err(_) => return Verdict::Wrong(Error::Crc),
+            Err(_) => return shifted(bytes, pending.reply).unwrap_or(Verdict::Wrong(Error::Crc)),
             Ok(frame) => match (late, pending.check(&frame)) {
                 (None, Ok(())) => return Verdict::Reply,
                 (None, Err(field)) => return Verdict::Wrong(Error::Shape(field)),
-                (Some(owed), _) => self.owed.pay(owed),
+                (Some(owed), _) => self.note_late(owed, now),
             },
         }
         Verdict::Wrong(Error::Stale)
+    }
+
+    /// The reply of this look has come late: its debt is paid.
+    pub(super) fn note_late(&mut self, owed: Signature, now: Instant) {
+        if let Some(sent) = self.owed.sent(owed) {
+            let late = timing::since(now, sent);
+            self.lateness = Some(self.lateness.map_or(late, |before| before.max(late)));
+        }
+        self.owed.pay(owed);
     }
 
     /// Forgets the first `count` bytes received.
@@ -156,6 +165,21 @@ impl<S> Link<S> {
         self.stripped = true;
         self.length == 0
     }
+}
+
+/// The reply behind a few bytes too many: where it begins like one, its end is waited for.
+fn shifted(bytes: &[u8], reply: Signature) -> Option<Verdict> {
+    let begins = |by: &u8| {
+        let head = bytes.get(usize::from(*by)..).and_then(<[u8]>::first_chunk);
+        head == Some(&reply.head)
+    };
+    let by = (1..=MOST_SHIFTED).find(begins)?;
+    let from = usize::from(by);
+    let Some(frame) = bytes.get(from..from + reply.length) else {
+        return Some(Verdict::More);
+    };
+    let good = Frame::new_checked(frame).is_ok();
+    good.then_some(Verdict::Wrong(Error::Shifted(by)))
 }
 
 /// A refusal in the first five bytes, if its own CRC fits.

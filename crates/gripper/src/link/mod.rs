@@ -4,6 +4,8 @@
 //! to guess:
 //!
 //! - A reply ends by the length its request implies, never by silence: pauses inside it are fine.
+//! - A reply counts only if it was seen to start and to end in time. Whoever polls too late to see that
+//!   does not know how long it lay there, and asks anew.
 //! - The CRC is judged first, over that length; then address, function, byte count, reserved bits
 //!   and the echo of a write. Five bytes are an exception only if their own CRC fits.
 //! - After any failure the line is drained: nothing is sent before the reply that failed can no
@@ -24,7 +26,7 @@ mod types;
 
 pub use owed::Debt;
 pub use trace::{Counters, Entry, Event, TRACE_BYTES, TRACE_LEN, Trace};
-pub use types::{Config, Echo, Error, Field, PortFault, Refused};
+pub use types::{Config, Echo, Error, Field, MOST_SHIFTED, PortFault, Refused};
 
 use crate::rtu::{Request, Response};
 use crate::{Duration, Instant, timing};
@@ -75,6 +77,8 @@ pub struct Link<S> {
     request: [u8; MAX_REQUEST],
     owed: Owed,
     counters: Counters,
+    /// The longest time from a request to the reply that came too late.
+    lateness: Option<Duration>,
     trace: Trace,
 }
 
@@ -94,6 +98,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
             request: [0; MAX_REQUEST],
             owed: Owed::default(),
             counters: Counters::default(),
+            lateness: None,
             trace: Trace::default(),
         }
     }
@@ -116,6 +121,11 @@ impl<S: Read + ReadReady + Write> Link<S> {
     /// What happened since the start.
     pub fn counters(&self) -> Counters {
         self.counters
+    }
+
+    /// How late the latest of the late replies came, counted from its request; `None` where none came late.
+    pub fn lateness(&self) -> Option<Duration> {
+        self.lateness
     }
 
     /// What happened last.
@@ -200,14 +210,8 @@ impl<S: Read + ReadReady + Write> Link<S> {
             .emit(self.config.unit, &mut self.request)
             .map_err(|_| Refused::Length)?;
         self.send(pending.request_len, now)?;
-        let first_due = timing::after(
-            now,
-            timing::first_byte(self.config.baud, pending.request_len, self.config.response),
-        );
-        let last_due = timing::after(
-            first_due,
-            timing::last_byte(self.config.baud, pending.reply.length),
-        );
+        let first_due = timing::after(now, self.config.start_of_reply(pending.request_len));
+        let last_due = timing::after(first_due, self.config.end_of_reply(pending.reply.length));
         (self.length, self.stripped) = (0, false);
         self.state = State::Waiting {
             pending,
@@ -251,6 +255,25 @@ impl<S: Read + ReadReady + Write> Link<S> {
         }
     }
 
+    /// Nobody has polled for longer than [`Config::longest_exchange`]: a process that stood still, a
+    /// machine that slept. What lies in the port, and what an adapter kept back meanwhile, is thrown
+    /// away before anything is sent; what was owed is owed anew.
+    pub fn resume(&mut self, now: Instant) {
+        self.owed.prolong(now);
+        let rest = timing::after(now, self.quarantine());
+        match &mut self.state {
+            State::Idle { .. } => self.begin_drain(now, rest),
+            State::Draining {
+                until,
+                heard,
+                noisy,
+                ..
+            } => (*until, *heard, *noisy) = (rest.max(*until), now, now),
+            // The first drains anyway; the second is over, and the next poll says so.
+            State::Resting { .. } | State::Waiting { .. } => {}
+        }
+    }
+
     /// Rejects the reply just returned by [`Self::poll`]: its meaning is impossible. The line is
     /// drained as after any other failure.
     pub fn reject(&mut self, field: Field, request: &Request<'_>, now: Instant) -> Error {
@@ -267,25 +290,22 @@ impl<S: Read + ReadReady + Write> Link<S> {
         first_due: Instant,
         last_due: Instant,
     ) -> Option<Result<usize, Error>> {
-        if let Err(fault) = self.receive() {
+        let due = |length: usize| if length == 0 { first_due } else { last_due };
+        // The deadline comes before the bytes: what lies there now may have lain there for long.
+        let verdict = if now > due(self.length) {
+            Verdict::More
+        } else if let Err(fault) = self.receive() {
             self.owed.add(pending.reply, pending.sent, now);
             return Some(Err(Error::Port(self.fail_port(fault, now))));
-        }
-        let error = match self.judge(&pending) {
+        } else {
+            self.judge(&pending, now)
+        };
+        let error = match verdict {
             Verdict::Reply => return Some(Ok(self.accept(&pending, now))),
             Verdict::Wrong(error) => error,
-            Verdict::More
-                if now
-                    >= if self.length == 0 {
-                        first_due
-                    } else {
-                        last_due
-                    } =>
-            {
-                Error::Timeout {
-                    received: self.length,
-                }
-            }
+            Verdict::More if now >= due(self.length) => Error::Timeout {
+                received: self.length,
+            },
             Verdict::More => return None,
         };
         // An exception is the answer; anything else leaves the true reply outstanding.

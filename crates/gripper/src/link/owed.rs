@@ -74,6 +74,12 @@ impl Owed {
         self.0.retain(|entry| entry.until > now);
     }
 
+    /// Time stood still until `now`: what has not turned up may do so from now on.
+    pub(super) fn prolong(&mut self, now: Instant) {
+        let until = timing::after(now, timing::MEMORY);
+        self.0.iter_mut().for_each(|entry| entry.until = until);
+    }
+
     pub(super) fn debt(&self, signature: Signature) -> Debt {
         match self.0.iter().find(|entry| entry.signature == signature) {
             Some(entry) if entry.settled => Debt::Settled { until: entry.until },
@@ -138,6 +144,12 @@ impl Owed {
             let before = self.0.iter_mut().filter(|entry| entry.sent < sent);
             before.for_each(|entry| entry.settled = true);
         }
+    }
+
+    /// When the request of this look left, if its reply is owed.
+    pub(super) fn sent(&self, signature: Signature) -> Option<Instant> {
+        let owed = self.0.iter().find(|entry| entry.signature == signature);
+        owed.map(|entry| entry.sent)
     }
 
     /// When the first debt ends.

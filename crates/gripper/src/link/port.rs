@@ -156,7 +156,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
         }
         self.trace.note(now, Event::Late, frame);
         self.counters.count(Error::Stale);
-        self.owed.pay(owed);
+        self.note_late(owed, now);
         self.drop_front(length);
         length
     }

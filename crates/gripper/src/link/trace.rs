@@ -84,7 +84,7 @@ pub struct Counters {
 impl Counters {
     pub(super) fn count(&mut self, error: Error) {
         let counter = match error {
-            Error::Crc => &mut self.crc,
+            Error::Crc | Error::Shifted(_) => &mut self.crc,
             Error::Stale => &mut self.stale,
             Error::Shape(_) => &mut self.shape,
             Error::Timeout { .. } => &mut self.timeouts,

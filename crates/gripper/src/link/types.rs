@@ -16,6 +16,9 @@ pub struct Config {
     pub silence: Duration,
     /// Longest reply any request of the user has, bytes: the quarantine after a timeout.
     pub longest_reply: usize,
+    /// By how much later than that a reply may start, and end: for a serial tunnel that keeps bytes
+    /// back. Usually nothing.
+    pub patience: Duration,
 }
 
 impl Config {
@@ -29,9 +32,35 @@ impl Config {
             response,
             silence,
             longest_reply: 21,
+            patience: Duration::from_ticks(0),
         }
     }
+
+    /// From a request of `request` bytes to the latest start of its reply.
+    #[must_use]
+    pub const fn start_of_reply(&self, request: usize) -> Duration {
+        let start = timing::first_byte(self.baud, request, self.response);
+        Duration::from_ticks(start.as_ticks().saturating_add(self.patience.as_ticks()))
+    }
+
+    /// From there to the latest end of a reply of `reply` bytes.
+    #[must_use]
+    pub const fn end_of_reply(&self, reply: usize) -> Duration {
+        let end = timing::last_byte(self.baud, reply);
+        Duration::from_ticks(end.as_ticks().saturating_add(self.patience.as_ticks()))
+    }
+
+    /// The longest an exchange can take: the link's deadline.
+    #[must_use]
+    pub const fn longest_exchange(&self) -> Duration {
+        let start = self.start_of_reply(super::MAX_REQUEST).as_ticks();
+        let end = self.end_of_reply(self.longest_reply).as_ticks();
+        Duration::from_ticks(start.saturating_add(end))
+    }
 }
+
+/// Most bytes before a reply with which it is recognised, and named, as [`Error::Shifted`].
+pub const MOST_SHIFTED: u8 = 3;
 
 /// The check a valid reply failed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -65,6 +94,9 @@ pub enum PortFault {
 pub enum Error {
     /// As many bytes as the reply has, with a wrong CRC.
     Crc,
+    /// The reply, whole and right, after so many bytes that nobody sent (1 to [`MOST_SHIFTED`]). Not
+    /// taken: a bus that makes bytes up makes others up too.
+    Shifted(u8),
     /// The late reply to an earlier request.
     Stale,
     /// A whole frame with a right CRC that does not answer the request.
@@ -88,6 +120,12 @@ impl core::fmt::Display for Error {
             Self::Crc => write!(
                 f,
                 "the reply's CRC is wrong: check cable, ground and termination"
+            ),
+            Self::Shifted(by) => write!(
+                f,
+                "a whole good reply stands {by} extra byte{} late: the bus lacks bias or termination \
+                 (RS-485: A up, B down, 120 ohms at both ends)",
+                if by == 1 { "" } else { "s" }
             ),
             Self::Stale => write!(
                 f,

@@ -17,7 +17,7 @@ Examples:
   gauntlet gripper move     --gripper /dev/ttyUSB1 --to 120      all fingers, 0 open to 255 closed
   gauntlet gripper move     --gripper tcp:192.168.1.11 --to 100,100,100,137 --speed 50
   gauntlet gripper mode pinch --gripper /dev/ttyUSB1
-  gauntlet gripper watch    --gripper /dev/ttyUSB1 --model 2f85 --seconds 10
+  gauntlet gripper watch    --gripper /dev/ttyUSB1 --gripper-model 2f85 --seconds 10
 
 status and watch only read. Ctrl-C during a move holds the gripper where it is.")]
 pub struct Gripper {
@@ -99,18 +99,22 @@ pub struct Target {
     #[arg(long, value_name = "PORT")]
     pub gripper: PathBuf,
     /// Which gripper it is.
-    #[arg(long, value_enum, default_value_t = Model::ThreeFinger)]
+    #[arg(long = "gripper-model", visible_alias = "model", value_name = "MODEL", value_enum, default_value_t = Model::ThreeFinger)]
     pub model: Model,
-    /// Take it for a --model even if it answers as one of another family: only for a gripper whose firmware answers what
+    /// Take it for a --gripper-model even if it answers as one of another family: only for a gripper whose firmware answers what
     /// its manual does not name. A command for another family moves the fingers elsewhere.
     #[arg(long)]
     pub trust_model: bool,
     /// Its Modbus unit (slave id), if not 9 on a serial line or 2 over TCP.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=247))]
     pub unit: Option<u8>,
-    /// Speed of the serial line, if not 115200.
+    /// Speed of the serial line, if not 115200; a network has none.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
     pub baud: Option<u32>,
+    /// Wait so much longer for answers, milliseconds (1 to 1000): for a serial tunnel or a slow network. A move then
+    /// leads by smaller steps.
+    #[arg(long, value_name = "MS", value_parser = crate::line::patience)]
+    pub patience: Option<Duration>,
     /// Show the status block's bytes too.
     #[arg(long)]
     pub raw: bool,
@@ -128,6 +132,7 @@ impl Target {
             trust_model: false,
             unit: None,
             baud: None,
+            patience: None,
             raw: false,
             json: false,
         }
@@ -147,8 +152,67 @@ impl Target {
         Settings {
             unit: self.unit,
             baud: self.baud,
-            ..Settings::default()
+            patience: self.patience,
         }
+    }
+
+    /// `gauntlet gripper VERB` for the same gripper, to be pasted.
+    pub fn again(&self, verb: &str) -> String {
+        self.command(verb, self.patience)
+    }
+
+    /// The same with more patience than now.
+    pub fn patient(&self, verb: &str) -> String {
+        self.patient_for(verb, Duration::ZERO)
+    }
+
+    /// The same with patience for answers as late as `late`, and some to spare.
+    pub fn patient_for(&self, verb: &str, late: Duration) -> String {
+        let now = self.settings().patience();
+        // In steps of 100 ms.
+        let enough = Duration::from_millis(100 * (late.as_millis() as u64 / 100 + 1));
+        let more = (now + Duration::from_millis(100)).max(enough + Duration::from_millis(100));
+        self.command(verb, Some(more.min(crate::line::MOST_PATIENCE)))
+    }
+
+    /// `gauntlet doctor` for the same gripper, to be pasted.
+    pub fn doctor(&self) -> String {
+        self.words("doctor", self.patience)
+    }
+
+    fn command(&self, verb: &str, patience: Option<Duration>) -> String {
+        self.words(&format!("gripper {verb}"), patience)
+    }
+
+    fn words(&self, verb: &str, patience: Option<Duration>) -> String {
+        let mut text = format!("`gauntlet {verb} --gripper {}", quoted(&self.gripper));
+        if let Some(value) = self.model.to_possible_value()
+            && self.model != Model::ThreeFinger
+        {
+            text.push_str(&format!(" --gripper-model {}", value.get_name()));
+        }
+        if let Some(unit) = self.unit {
+            text.push_str(&format!(" --unit {unit}"));
+        }
+        if let Some(baud) = self.baud {
+            text.push_str(&format!(" --baud {baud}"));
+        }
+        if let Some(patience) = patience {
+            text.push_str(&format!(" --patience {}", patience.as_millis()));
+        }
+        text.push('`');
+        text
+    }
+}
+
+/// A path as a shell takes it.
+fn quoted(path: &Path) -> String {
+    let text = path.display().to_string();
+    let plain = |c: char| c.is_alphanumeric() || "/._-:[]@+".contains(c);
+    if text.chars().all(plain) {
+        text
+    } else {
+        format!("'{}'", text.replace('\'', "'\\''"))
     }
 }
 

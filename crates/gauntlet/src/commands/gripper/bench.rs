@@ -3,12 +3,11 @@
 use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
-use anyhow::Result;
 use gripper::driver::{Control, Outcome, Task, ThreeFinger, TwoFinger};
 use gripper::registers::{three_finger, two_finger};
-use gripper::{Gripper, Status};
+use gripper::travel::Speed;
+use gripper::{Gripper, Status, link};
 
-use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::line::Line;
 use crate::platform::Clock;
@@ -18,8 +17,6 @@ use crate::tcp;
 pub const ANSWER_WAIT: Duration = Duration::from_secs(3);
 /// Pause between two looks at the line.
 const LOOK: Duration = Duration::from_millis(1);
-/// Longer than every task's own deadline, for a driver that is never polled to its end.
-const TASK_WAIT: Duration = Duration::from_secs(65);
 
 /// What the verbs need of a driver beyond [`Gripper`].
 pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
@@ -43,6 +40,10 @@ pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
     fn names(&self) -> (&'static str, [&'static str; X]);
     /// What only this family tells: name and value.
     fn facts(&self) -> Vec<(&'static str, String)>;
+    /// The greatest speed its axes can have.
+    fn speed(&self) -> Speed;
+    /// How late the latest of its late answers came; none where none was.
+    fn lateness(&self) -> Option<gripper::Duration>;
     /// What is wrong with the line, where it can tell better than the driver.
     fn line_error(&mut self) -> Option<tcp::Error>;
     /// Finds out whether the gripper is of this family before anything else.
@@ -101,6 +102,12 @@ impl Bench<4> for ThreeFinger<Line> {
         }
         facts
     }
+    fn speed(&self) -> Speed {
+        Speed::THREE_FINGER
+    }
+    fn lateness(&self) -> Option<gripper::Duration> {
+        self.link().lateness()
+    }
     fn line_error(&mut self) -> Option<tcp::Error> {
         self.serial_mut().error()
     }
@@ -152,6 +159,12 @@ impl Bench<1> for TwoFinger<Line> {
             .map(|fault| ("controller", format!("fault {fault:X}: see its manual")))
             .into_iter()
             .collect()
+    }
+    fn speed(&self) -> Speed {
+        Speed::of_model(self.model())
+    }
+    fn lateness(&self) -> Option<gripper::Duration> {
+        self.link().lateness()
     }
     fn line_error(&mut self) -> Option<tcp::Error> {
         self.serial_mut().error()
@@ -214,91 +227,29 @@ impl Waiter {
     pub fn status<B: Bench<X>, const X: usize>(
         &self,
         driver: &mut B,
+        patience: Duration,
     ) -> Result<Status<X>, Option<gripper::Error>> {
         let mut last = None;
-        self.pump(driver, ANSWER_WAIT, |driver, _, heard| match heard {
-            Some(Ok(status)) if driver.is_identified() => ControlFlow::Break(Some(status)),
-            Some(Err(error)) => {
-                last = Some(error);
-                match error {
-                    // It will not become another one.
-                    gripper::Error::OtherGripper(_) => ControlFlow::Break(None),
-                    _ => ControlFlow::Continue(()),
+        self.pump(
+            driver,
+            ANSWER_WAIT + 10 * patience,
+            |driver, _, heard| match heard {
+                Some(Ok(status)) if driver.is_identified() => ControlFlow::Break(Some(status)),
+                Some(Err(error)) => {
+                    // What tells most is kept.
+                    if !matches!(last, Some(gripper::Error::Link(link::Error::Shifted(_)))) {
+                        last = Some(error);
+                    }
+                    match error {
+                        // It will not become another one.
+                        gripper::Error::OtherGripper(_) => ControlFlow::Break(None),
+                        _ => ControlFlow::Continue(()),
+                    }
                 }
-            }
-            _ => ControlFlow::Continue(()),
-        })
+                _ => ControlFlow::Continue(()),
+            },
+        )
         .flatten()
         .ok_or(last)
     }
-
-    /// Waits until the task just asked for has ended.
-    ///
-    /// # Errors
-    /// A failure that says why it did not happen, and what to do.
-    pub fn finish<B: Bench<X>, const X: usize>(&self, driver: &mut B) -> Result<()> {
-        let mut last = None;
-        let written = driver.counters().writes;
-        let ended = self.pump(driver, TASK_WAIT, |driver, _, heard| {
-            last = heard.and_then(Result::err).or(last);
-            match driver.outcome() {
-                (None, Some(outcome)) => ControlFlow::Break(outcome),
-                _ => ControlFlow::Continue(()),
-            }
-        });
-        match ended {
-            Some((_, Outcome::Done)) => Ok(()),
-            Some((task, Outcome::Failed(why))) => Err(failed(task, why, last)),
-            _ if self.interrupt.asked() && driver.counters().writes == written => {
-                Err(Failure::interrupted("before the gripper was told anything").into())
-            }
-            _ if self.interrupt.asked() => Err(Failure::new(
-                "interrupted; the gripper goes on by itself with what it has begun",
-                "`gauntlet gripper status`",
-            )
-            .into()),
-            _ => Err(Failure::new(
-                "the gripper did not finish in time",
-                "`gauntlet doctor --gripper …`",
-            )
-            .into()),
-        }
-    }
-}
-
-fn failed(
-    task: Task,
-    why: gripper::driver::Failure,
-    last: Option<gripper::Error>,
-) -> anyhow::Error {
-    use gripper::driver::Failure as Why;
-    match why {
-        Why::Fault(fault) => Failure::new(
-            format!(
-                "the {task} failed: fault {:02X}: {}",
-                fault.code(),
-                fault.sentence()
-            ),
-            fault.action(),
-        ),
-        Why::NotReady(gripper::Activation::Reset) => Failure::new(
-            format!("no {task}: the gripper is not activated"),
-            "`gauntlet gripper activate`: the fingers move",
-        ),
-        Why::NotReady(_) => Failure::new(
-            format!("no {task}: the gripper is busy activating or changing its mode"),
-            "again in a few seconds",
-        ),
-        Why::Deadline => {
-            let last = match last {
-                Some(gripper::Error::Link(error)) => format!("; last on the line: {error}"),
-                _ => String::new(),
-            };
-            Failure::new(
-                format!("the {task} did not end in time{last}"),
-                "clearing the fingers' way, then `gauntlet doctor --gripper …`",
-            )
-        }
-    }
-    .into()
 }

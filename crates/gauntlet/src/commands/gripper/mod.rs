@@ -1,9 +1,13 @@
 //! `gauntlet gripper`: a gripper at a bench. Nothing moves but by the verb that says so.
 
 mod args;
+mod axes;
 mod bench;
+mod leader;
 mod motion;
+mod progress;
 mod table;
+mod task;
 
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -100,7 +104,8 @@ fn first_status<B: Bench<X>, const X: usize>(
     config: gripper::driver::Config,
 ) -> Result<Status<X>> {
     driver.identify();
-    waiter.status(driver).map_err(|last| {
+    let patience = target.settings().patience();
+    waiter.status(driver, patience).map_err(|last| {
         if waiter.interrupt.asked() {
             return Failure::interrupted("before the gripper answered").into();
         }
@@ -141,7 +146,7 @@ fn act<B: Bench<X>, const X: usize>(
         Verb::Reset(_) => {
             tell.say(format_args!("resetting: the gripper lets go"));
             doing.driver.reset();
-            doing.waiter.finish(&mut doing.driver)?;
+            doing.finish()?;
         }
         Verb::Watch(options) => return doing.watch(options.seconds),
     }
@@ -163,9 +168,9 @@ fn no_answer<B: Bench<X>, const X: usize>(
                 kind.name()
             ),
             match kind {
-                Kind::ThreeFinger => "--model 3f",
+                Kind::ThreeFinger => "--gripper-model 3f (--model 3f is the same)",
                 Kind::TwoFinger => {
-                    "--model 2f85, 2f140 or hande: which of them it is no register says"
+                    "--gripper-model 2f85, 2f140 or hande (--model 2f85 is the same): which of them it is no register says"
                 }
             },
         )
@@ -176,7 +181,41 @@ fn no_answer<B: Bench<X>, const X: usize>(
             "no {name} answers at {place} as unit {}: {error}",
             config.unit
         );
-        return Failure::new(what, error.next_step()).into();
+        let next = match error {
+            crate::tcp::Error::Timeout => format!(
+                "{}; ending other programs that are connected to it; another --unit (2 by default); the gripper's power",
+                target.patient("status")
+            ),
+            error => error.next_step().to_owned(),
+        };
+        return Failure::new(what, next).into();
+    }
+    if let Some(late) = driver.lateness() {
+        let late = late.as_ticks().div_ceil(1_000);
+        return Failure::new(
+            format!(
+                "a gripper answers on {place} as unit {}, but late: up to {late} ms after it was asked",
+                config.unit
+            ),
+            format!(
+                "{}, which waits longer; the adapter's latency timer (`gauntlet ports`), or the tunnel that keeps its bytes back",
+                target.patient_for("status", Duration::from_millis(late))
+            ),
+        )
+        .into();
+    }
+    if let Some(gripper::Error::Link(error @ gripper::link::Error::Shifted(_))) = last {
+        return Failure::new(
+            format!(
+                "no {name} answers on {place} as unit {}: {error}",
+                config.unit
+            ),
+            format!(
+                "an adapter with bias resistors and 120 ohms at both ends of the bus, then {}",
+                target.again("status")
+            ),
+        )
+        .into();
     }
     let why = last.map_or_else(String::new, |error| format!(": {error}"));
     let refused = matches!(
@@ -189,7 +228,7 @@ fn no_answer<B: Bench<X>, const X: usize>(
                 "no {name} answers on {place} as unit {}{why}; a {name} sends no exceptions",
                 config.unit
             ),
-            "--model 2f85, 2f140 or hande, if it is one of them",
+            "--gripper-model 2f85, 2f140 or hande, if it is one of them",
         )
         .into();
     }
@@ -198,12 +237,20 @@ fn no_answer<B: Bench<X>, const X: usize>(
             "no {name} answers on {place} as unit {} at {} baud{why}",
             config.unit, config.baud
         ),
-        format!("`gauntlet doctor --gripper {place}`, which finds out which layer fails"),
+        format!("{}, which finds out which layer fails", target.doctor()),
     )
     .into()
 }
 
 impl<B> Doing<'_, B> {
+    /// Waits until the task just asked for has ended.
+    fn finish<const X: usize>(&mut self) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        task::finish(&self.waiter, &mut self.driver, self.target)
+    }
+
     fn place(&self) -> String {
         self.target.gripper.display().to_string()
     }
@@ -221,7 +268,7 @@ impl<B> Doing<'_, B> {
         self.tell
             .say(format_args!("activating: the fingers move, keep clear"));
         self.driver.activate();
-        self.waiter.finish(&mut self.driver)
+        self.finish()
     }
 
     fn mode<const X: usize>(&mut self, mode: Grasp) -> Result<()>
@@ -231,11 +278,12 @@ impl<B> Doing<'_, B> {
         if !self.driver.set_mode(mode.into()) {
             let (name, _) = self.driver.names();
             let what = format!("a {name} has no grasping modes");
-            return Err(Failure::usage(what, "`gauntlet gripper move`").into());
+            let next = self.target.again("move --to 120");
+            return Err(Failure::usage(what, next).into());
         }
         self.tell
             .say(format_args!("changing the mode: the fingers move"));
-        self.waiter.finish(&mut self.driver)
+        self.finish()
     }
 
     fn release<const X: usize>(&mut self, closing: bool) -> Result<()>
@@ -252,7 +300,7 @@ impl<B> Doing<'_, B> {
         self.tell.say(format_args!(
             "automatic release: the fingers move slowly; it ends in fault 0F, as it should"
         ));
-        self.waiter.finish(&mut self.driver)
+        self.finish()
     }
 
     /// Reads once more and shows what is.
@@ -260,16 +308,18 @@ impl<B> Doing<'_, B> {
     where
         B: Bench<X>,
     {
-        let status = self.waiter.status(&mut self.driver).map_err(|_| {
-            if self.waiter.interrupt.asked() {
-                let what = "interrupted after it was done, before the state could be read again";
-                return Failure::new(what, "`gauntlet gripper status`");
-            }
-            Failure::new(
-                "the gripper stopped answering",
-                "`gauntlet doctor --gripper …`",
-            )
-        })?;
+        let patience = self.target.settings().patience();
+        let status = self
+            .waiter
+            .status(&mut self.driver, patience)
+            .map_err(|_| {
+                if self.waiter.interrupt.asked() {
+                    let what =
+                        "interrupted after it was done, before the state could be read again";
+                    return Failure::new(what, self.target.again("status"));
+                }
+                Failure::new("the gripper stopped answering", self.target.doctor())
+            })?;
         let (place, raw) = (self.place(), self.target.raw);
         if self.target.json {
             return out::json(&table::json(&self.driver, &status, &place, raw));
