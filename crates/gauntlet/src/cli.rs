@@ -1,11 +1,13 @@
 //! The command line: verbs, options, and the help a newcomer reads first.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
+use crate::failure::Failure;
 use crate::host_link::Address;
+use crate::line::Settings;
 
 /// Operate a Robotiq 3-Finger gripper with a glove of 16 orientation sensors, or try it all without hardware.
 ///
@@ -151,6 +153,44 @@ pub struct Simulate {
     pub seed: u64,
 }
 
+/// How a gripper's line differs from that of a gripper as delivered.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct LineOptions {
+    /// The gripper's Modbus unit (slave id), if not 9 on a serial line or 2 over TCP.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=247))]
+    pub unit: Option<u8>,
+    /// Speed of the gripper's serial line, if not 115200.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
+    pub baud: Option<u32>,
+    /// Wait so much longer for the gripper's answers, milliseconds (1 to 1000): for a serial tunnel or a slow network.
+    #[arg(long, value_name = "MS", value_parser = crate::line::patience)]
+    pub patience: Option<Duration>,
+}
+
+impl LineOptions {
+    /// The same for a line, if it fits `path`.
+    ///
+    /// # Errors
+    /// A failure of usage: a speed for a line that has none.
+    pub fn settings(&self, path: &Path) -> Result<Settings, Failure> {
+        let is_tcp = crate::tcp::Address::parse(path)?.is_some();
+        if let Some(baud) = self.baud.filter(|_| is_tcp) {
+            return Err(Failure::usage(
+                format!(
+                    "--baud {baud} is the speed of a serial line, and {} is none",
+                    path.display()
+                ),
+                "the same without --baud",
+            ));
+        }
+        Ok(Settings {
+            unit: self.unit,
+            baud: self.baud,
+            patience: self.patience,
+        })
+    }
+}
+
 /// Which hand wears the glove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub enum Hand {
@@ -195,6 +235,12 @@ pub struct Teleop {
     /// Calibrate on the flat hand before the clutch may close: waits up to 30 s until it lies still for a second.
     #[arg(long)]
     pub calibrate_flat: bool,
+    /// How the gripper's line differs from that of a gripper as delivered.
+    #[command(flatten)]
+    pub line: LineOptions,
+    /// Which gripper it is: only the 3-Finger follows a glove for now.
+    #[arg(long, value_enum, default_value_t = crate::commands::gripper::Model::ThreeFinger)]
+    pub gripper_model: crate::commands::gripper::Model,
     /// Write every frame, command and status into this session log.
     #[arg(long, value_name = "FILE.mcap")]
     pub log: Option<PathBuf>,

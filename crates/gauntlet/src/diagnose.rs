@@ -3,15 +3,20 @@
 //! Asking never moves or changes a gripper (status reads only). A glove's sensors are brought up, as every program that
 //! reads them does.
 
+mod answer;
 mod glove;
 mod gripper;
+mod network;
+mod place;
 mod raw;
 mod search;
+mod serial;
 
 use serde::Serialize;
 
-pub use glove::glove;
-pub use gripper::gripper;
+pub use glove::{glove, no_glove};
+pub use gripper::{gripper, no_gripper};
+pub use place::{Asked, Place};
 
 use crate::failure::Failure;
 
@@ -59,6 +64,15 @@ impl Findings {
         self.add(layer, Verdict::Wrong, what.into(), Some(next.into()));
     }
 
+    /// Wrong where it is so in half of the cases or more, else a note.
+    fn by_share(&mut self, layer: &'static str, so: usize, of: usize, what: String, next: &str) {
+        if 2 * so >= of {
+            self.wrong(layer, what, next);
+        } else {
+            self.note(layer, what, next);
+        }
+    }
+
     fn failure(&mut self, layer: &'static str, failure: &Failure) {
         self.wrong(layer, failure.to_string(), failure.next_step());
     }
@@ -70,6 +84,13 @@ impl Findings {
             what,
             next,
         });
+    }
+
+    /// The first thing that is wrong.
+    pub fn first_wrong(&self) -> Option<&Finding> {
+        self.0
+            .iter()
+            .find(|finding| finding.verdict == Verdict::Wrong)
     }
 
     /// How many things are wrong.

@@ -132,6 +132,13 @@ pub fn latency_warning(path: &Path) -> Option<String> {
         .pop()
 }
 
+/// The same as what is wrong, and the command that helps.
+pub fn latency_fault(path: &Path) -> Option<(String, String)> {
+    let warning = latency_warning(path)?;
+    let (what, command) = warning.split_once(": `")?;
+    Some((what.to_owned(), format!("`{command}")))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

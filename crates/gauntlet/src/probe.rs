@@ -8,6 +8,7 @@ use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::ThreeFinger;
 use gripper::{Gripper, Status};
 
+use crate::diagnose;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::line::{Line, Settings};
@@ -72,15 +73,11 @@ pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
     if interrupt.asked() {
         return Err(Failure::interrupted("while the glove was looked for").into());
     }
-    Err(Failure::new(
-        format!(
-            "no glove answers on {}: asked its serial multiplexer (SC18IM) at {BAUD} and {RESET_BAUD} baud",
-            path.display()
-        ),
-        "the glove's power, TX against RX, whether this is the gripper's port (`gauntlet ports`); \
-         then unplug the glove and plug it in again",
-    )
-    .into())
+    let what = format!(
+        "no glove answers on {}, asked for its serial multiplexer (SC18IM) at {BAUD} and {RESET_BAUD} baud",
+        path.display()
+    );
+    Err(diagnose::no_glove(&what, path, interrupt).into())
 }
 
 /// Twice at once, and once more after the time in which a cut-off command is forgotten.
@@ -117,61 +114,69 @@ fn discard(port: &mut Port) {
     }
 }
 
-/// What came instead of an answer, where it was not silence.
-fn because(error: gripper::Error) -> String {
-    use gripper::link::Error::Timeout;
-    match error {
-        gripper::Error::Link(Timeout { received: 0 }) => String::new(),
-        gripper::Error::Link(Timeout { received }) => {
-            format!("; {received} bytes came that make no reply")
-        }
-        other => format!("; {other}"),
-    }
-}
-
-/// Opens the gripper's line, a serial port or `tcp:HOST[:PORT]`, and reads its status.
+/// Opens the line of a gripper as delivered, a serial port or `tcp:HOST[:PORT]`, and reads its status.
 ///
 /// # Errors
-/// A failure that says whether the port does not open or nobody answers on it, and what to try.
+/// As [`open_gripper_with`].
 pub fn open_gripper(path: &Path, interrupt: &Interrupt) -> Result<(Line, Status<AXES>)> {
-    let mut port = Line::open(path, Settings::default(), interrupt)?;
-    let config = port.driver_config(Settings::default());
-    let unit = config.unit;
+    open_gripper_with(path, Settings::default(), interrupt)
+}
+
+/// The same where unit, speed or patience differ from those of a gripper as delivered.
+///
+/// # Errors
+/// A failure that says whether the port does not open or nobody answers on it, what came instead, and what to try.
+pub fn open_gripper_with(
+    path: &Path,
+    settings: Settings,
+    interrupt: &Interrupt,
+) -> Result<(Line, Status<AXES>)> {
+    let mut port = Line::open(path, settings, interrupt)?;
+    let config = port.driver_config(settings);
     let clock = Clock::start();
     let end = Instant::now() + GRIPPER_WAIT;
     let mut driver = ThreeFinger::new(&mut port, config);
-    let mut last_error = None;
-    while Instant::now() < end && !interrupt.sleep(LOOK) {
+    let mut other = None;
+    while Instant::now() < end && other.is_none() && !interrupt.sleep(LOOK) {
         match driver.poll(clock.now()) {
             Some(Ok(status)) => {
                 drop(driver);
                 return Ok((port, status));
             }
-            Some(Err(error)) => last_error = Some(error),
-            None => {}
+            Some(Err(gripper::Error::OtherGripper(kind))) => other = Some(kind),
+            Some(Err(_)) | None => {}
         }
     }
+    drop(driver);
+    drop(port);
     if interrupt.asked() {
         return Err(Failure::interrupted("while the gripper was looked for").into());
     }
-    if let Some(error) = port.error() {
-        return Err(Failure::new(
-            format!(
-                "no gripper answers at {} as unit {unit}: {error}",
-                path.display()
-            ),
-            error.next_step(),
-        )
-        .into());
+    if let Some(kind) = other {
+        return Err(other_gripper(path, kind).into());
     }
-    let why = last_error.map_or_else(String::new, because);
-    Err(Failure::new(
+    let what = format!(
+        "no gripper answers on {} as unit {}",
+        path.display(),
+        config.unit
+    );
+    let asked = diagnose::Asked {
+        settings,
+        model: None,
+    };
+    Err(diagnose::no_gripper(&what, path, asked, interrupt).into())
+}
+
+fn other_gripper(path: &Path, kind: gripper::registers::Kind) -> Failure {
+    Failure::new(
         format!(
-            "no gripper answers on {}: read the status of unit {unit} at {BAUD} baud{why}",
+            "a {} answers on {}, and a glove drives the 3-Finger gripper only: nothing was written to it",
+            kind.name(),
             path.display()
         ),
-        "the gripper's 24 V supply, RS-485 A against B, whether this is the glove's port (`gauntlet ports`), \
-         and baud and slave id in the vendor's tool",
+        format!(
+            "`gauntlet gripper move --gripper {} --gripper-model 2f85 --to 100`",
+            path.display()
+        ),
     )
-    .into())
 }

@@ -6,7 +6,9 @@ use anyhow::Result;
 use clap::Args;
 use serde_json::json;
 
-use crate::diagnose::{self, Findings, Verdict};
+use crate::cli::LineOptions;
+use crate::commands::gripper::Model;
+use crate::diagnose::{self, Asked, Findings, Verdict};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 use crate::{out, ports, say};
@@ -17,10 +19,12 @@ use crate::{out, ports, say};
 Examples:
   gauntlet doctor                                           the ports alone
   gauntlet doctor --gripper /dev/ttyUSB1 --glove /dev/ttyUSB0
+  gauntlet doctor --gripper /dev/ttyUSB1 --unit 12 --baud 57600 --gripper-model 2f85
   gauntlet doctor --gripper tcp:192.168.1.11 --json
 
 Nothing moves: a gripper is only read. A glove's sensors are brought up. A gripper that does not answer
 is looked for at other speeds and under every unit number, which takes up to half a minute (Ctrl-C ends it).
+It ends by itself whatever a line says, one that never falls silent too.
 Exit code 1 when something is wrong.")]
 pub struct Doctor {
     /// The gripper's serial port, or `tcp:HOST[:PORT]`.
@@ -29,6 +33,12 @@ pub struct Doctor {
     /// The glove's serial port.
     #[arg(long, value_name = "PORT")]
     pub glove: Option<PathBuf>,
+    /// How the gripper's line differs from that of a gripper as delivered.
+    #[command(flatten)]
+    pub line: LineOptions,
+    /// Which gripper it should be; without it, whichever answers.
+    #[arg(long, value_enum, requires = "gripper")]
+    pub gripper_model: Option<Model>,
     /// Print the findings as JSON.
     #[arg(long)]
     pub json: bool,
@@ -47,7 +57,11 @@ pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
         all.push((device, place, findings));
     };
     if let Some(path) = &options.gripper {
-        let findings = diagnose::gripper(path, interrupt);
+        let asked = Asked {
+            settings: options.line.settings(path)?,
+            model: options.gripper_model,
+        };
+        let findings = diagnose::gripper(path, asked, interrupt);
         examine("gripper", path.display().to_string(), findings);
     }
     if let Some(path) = &options.glove {
@@ -72,10 +86,20 @@ pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
     }
     match faults {
         0 => Ok(()),
-        1 => Err(Failure::new("1 thing is wrong", "what stands below it").into()),
+        1 => {
+            let next = all
+                .iter()
+                .find_map(|(_, _, findings)| findings.first_wrong());
+            let next = next.and_then(|wrong| wrong.next.clone());
+            Err(Failure::new("1 thing is wrong", next.unwrap_or_default()).into())
+        }
         _ => {
             let what = format!("{faults} things are wrong");
-            Err(Failure::new(what, "the first one first").into())
+            Err(Failure::new(
+                what,
+                "the first one marked WRONG first: what it says to try",
+            )
+            .into())
         }
     }
 }

@@ -30,6 +30,8 @@ pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
 pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_ports(options)?;
+    check_model(options)?;
+    let line = options.line.settings(&options.gripper)?;
     if let Some(path) = &options.log {
         outputs::check_new(path)?;
     }
@@ -40,7 +42,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
             tell.say(format_args!("warning: {}: {warning}", path.display()));
         }
     }
-    let (gripper, status) = probe::open_gripper(&options.gripper, interrupt)?;
+    let (gripper, status) = probe::open_gripper_with(&options.gripper, line, interrupt)?;
     tell.say(format_args!(
         "gripper  {}  answers, {}",
         options.gripper.display(),
@@ -96,6 +98,24 @@ fn check_ports(options: &Teleop) -> Result<()> {
         .into());
     }
     Ok(())
+}
+
+/// Only the 3-Finger gripper follows a glove for now.
+fn check_model(options: &Teleop) -> Result<()> {
+    let model = options.gripper_model;
+    if model.two_finger().is_none() {
+        return Ok(());
+    }
+    let what = format!(
+        "teleop drives the 3-Finger gripper only for now, not the {}",
+        model.name()
+    );
+    let next = format!(
+        "`gauntlet gripper move --gripper {} --gripper-model {} --to 100`, which moves it at a bench",
+        options.gripper.display(),
+        model.option()
+    );
+    Err(Failure::usage(what, next).into())
 }
 
 fn config(hand: Hand) -> Result<bridge::Config<AXES>> {

@@ -1,20 +1,22 @@
 //! A glove's layers: port, serial bridge (SC18IM), I²C multiplexer (TCA9548A), 16 sensors.
 
-use std::path::Path;
-use std::time::{Duration, Instant};
+mod bridge_line;
+mod sensors;
 
-use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
-use glove::scan::{Config, Health, Scanner, State};
-use glove::{imu, mux};
+use std::path::Path;
+use std::time::Duration;
+
+use glove::mux;
 
 use super::Findings;
-use super::raw::{Heard, ask};
+use super::answer::Came;
+use super::place::quoted;
 use super::search::{UNIT, persist};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::platform::Clock;
 use crate::port::{BAUD, Port};
 use crate::ports;
+use bridge_line::{ask, nobody, survey};
 
 /// The SC18IM's speed after power-on.
 const RESET_BAUD: u32 = 9_600;
@@ -32,55 +34,81 @@ const NO_ACKNOWLEDGE: u8 = 0xF1;
 const BUS_HUNG: u8 = 0xF8;
 /// For its one byte: 4.2 ms at 9600 baud, an adapter's latency timer twice, a PC with other work.
 const WAIT: Duration = Duration::from_millis(80);
-/// A command cut off by whoever used the port before is forgotten after this.
-const IDLE: Duration = Duration::from_millis(700);
-/// All sensors are up 1.6 s after power-on, slower at 9600 baud.
-const BRING_UP: Duration = Duration::from_secs(6);
-/// The same at 9600 baud.
-const BRING_UP_SLOW: Duration = Duration::from_secs(20);
-/// Time for a sensor to come after the first frame.
-const STRAGGLERS: Duration = Duration::from_secs(2);
 
-/// Finds out which layer of the glove at `path` fails.
+/// Finds out which layer of the glove at `path` fails. Ends within half a minute, whatever comes.
 pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
     let mut findings = Findings::default();
+    if let Some((port, baud)) = find(path, &BAUDS, &mut findings, interrupt) {
+        let mut port = port;
+        if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
+            sensors::sensors(port, baud, address, &mut findings, interrupt);
+        }
+    }
+    findings
+}
+
+/// Why no glove answers at `path`, in a few seconds. The failure begins with `what`; the next step can be pasted.
+pub fn no_glove(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
+    let mut findings = Findings::default();
+    let found = find(path, &[BAUD, RESET_BAUD], &mut findings, interrupt);
+    let doctor = format!("`gauntlet doctor --glove {}`", quoted(path));
+    match findings.first_wrong() {
+        Some(wrong) => {
+            let next = wrong.next.clone().unwrap_or_default();
+            Failure::new(
+                format!("{what}: {}", wrong.what),
+                format!("{next}; then {doctor}"),
+            )
+        }
+        None if found.is_some() => {
+            Failure::new(format!("{what} in time, though it answers now"), doctor)
+        }
+        None => Failure::new(what, doctor),
+    }
+}
+
+/// The glove's serial bridge at one of these speeds; else what is there instead is told.
+fn find(
+    path: &Path,
+    bauds: &[u32],
+    findings: &mut Findings,
+    interrupt: &Interrupt,
+) -> Option<(Port, u32)> {
     match Port::open(path, BAUD) {
         Ok(_) => findings.good("port", format!("{} opens", path.display())),
         Err(error) => {
             findings.failure("port", &Failure::from(error));
-            return findings;
+            return None;
         }
     }
-    if let Some(warning) = ports::latency_warning(path) {
-        findings.wrong("port", warning, "the command above");
+    if let Some((what, next)) = ports::latency_fault(path) {
+        findings.wrong("port", what, next);
     }
-    let mut noise = Vec::new();
-    for baud in BAUDS {
+    let mut seen = Vec::new();
+    for &baud in bauds {
         let Ok(mut port) = Port::open(path, baud) else {
             continue;
         };
-        match answers(&mut port, interrupt) {
-            Ok(status) => {
-                bridge(baud, status, &mut findings);
-                if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
-                    sensors(port, baud, address, &mut findings, interrupt);
-                }
-                return findings;
-            }
-            Err(bytes) if !bytes.is_empty() => noise.push((baud, bytes)),
-            Err(_) => {}
+        let survey = survey(&mut port, interrupt);
+        if let Some(status) = survey.status() {
+            bridge(baud, status, findings);
+            survey.tell(findings);
+            return Some((port, baud));
         }
+        seen.push((baud, survey));
     }
-    if gripper_answers(path, interrupt) {
+    if interrupt.asked() {
+        findings.note("bridge", "interrupted", "again");
+    } else if gripper_answers(path, interrupt) {
         findings.wrong(
             "bridge",
             "this is the gripper's port: a Modbus status comes, no glove",
             "the other port for --glove (`gauntlet ports`)",
         );
     } else {
-        nobody(&noise, &mut findings);
+        nobody(&seen, findings);
     }
-    findings
+    None
 }
 
 /// Whether a glove's serial bridge answers at `path`, at the speed it is set to or that of its power-on.
@@ -98,26 +126,9 @@ pub(super) fn glove_answers(path: &Path, interrupt: &Interrupt) -> bool {
 
 fn gripper_answers(path: &Path, interrupt: &Interrupt) -> bool {
     Port::open(path, BAUD).is_ok_and(|mut port| {
-        let heard = persist(&mut port, UNIT, interrupt);
-        matches!(heard, Heard::Answer(..))
+        let came = persist(&mut port, UNIT, BAUD, WAIT, interrupt);
+        matches!(came, Came::Answer(_))
     })
-}
-
-/// I2CStat, or what came instead of it.
-fn answers(port: &mut Port, interrupt: &Interrupt) -> Result<u8, Vec<u8>> {
-    let mut worst = Vec::new();
-    for attempt in 0..3 {
-        if attempt == 2 {
-            interrupt.sleep(IDLE);
-        }
-        let heard = ask(port, &READ_STATUS, 1, WAIT, interrupt);
-        match heard[..] {
-            [status @ 0xF0..=0xF8] => return Ok(status),
-            [] => {}
-            _ => worst = heard,
-        }
-    }
-    Err(worst)
 }
 
 fn bridge(baud: u32, status: u8, findings: &mut Findings) {
@@ -211,218 +222,4 @@ fn multiplexer(port: &mut Port, findings: &mut Findings, interrupt: &Interrupt) 
         ),
     }
     elsewhere
-}
-
-fn nobody(noise: &[(u32, Vec<u8>)], findings: &mut Findings) {
-    let speeds = BAUDS.map(|baud| baud.to_string()).join(", ");
-    let Some((baud, bytes)) = noise.first() else {
-        return findings.wrong(
-            "bridge",
-            format!("no byte comes: no OK, no I2CStat; asked at {speeds} baud"),
-            "the glove's power, TX against RX, and whether this is the gripper's port (`gauntlet ports`)",
-        );
-    };
-    let count = bytes.len();
-    findings.wrong(
-        "bridge",
-        format!("{count} bytes come at {baud} baud, but no I2CStat (one byte F0 to F8); asked at {speeds} baud"),
-        "unplug the glove and plug it in again (it then speaks 9600 baud); whether this is the glove's port",
-    );
-}
-
-/// Brings the sensors up and looks which of them give orientations.
-fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrupt: &Interrupt) {
-    let config = Config {
-        baud,
-        mux,
-        ..Config::default()
-    };
-    let mut scanner = Scanner::new(port, config);
-    let clock = Clock::start();
-    let time = if baud == RESET_BAUD {
-        BRING_UP_SLOW
-    } else {
-        BRING_UP
-    };
-    let mut end = Instant::now() + time;
-    let (mut frames, mut since) = (0_u32, Instant::now());
-    let mut seen = [Seen::default(); SEGMENT_COUNT];
-    while Instant::now() < end && !interrupt.sleep(Duration::from_millis(1)) {
-        let Some(frame) = scanner.poll(clock.now()) else {
-            continue;
-        };
-        if frames == 0 {
-            since = Instant::now();
-            end = end.min(since + STRAGGLERS);
-        }
-        frames += 1;
-        for (seen, sample) in seen.iter_mut().zip(&frame.samples) {
-            seen.take(sample.health);
-        }
-        if seen.iter().all(|seen| seen.good > 0) && frames >= 10 {
-            break;
-        }
-    }
-    if interrupt.asked() {
-        return findings.note("sensors", "interrupted", "again");
-    }
-    if frames > 1 {
-        let rate = f64::from(frames - 1) / since.elapsed().as_secs_f64();
-        findings.good("bridge", format!("{rate:.0} scans a second"));
-    }
-    if matches!(scanner.state(), State::NoAnswer | State::Resync) {
-        return findings.wrong(
-            "bridge",
-            "the serial bridge answers one question and then falls silent",
-            "cable and power of the glove; then unplug it and plug it in again",
-        );
-    }
-    let health = scanner.health();
-    // One that gave orientations and missed the last scan is not missing.
-    let lasting = core::array::from_fn(|k| match seen[k].good {
-        0 => health[k],
-        _ => Health::Good,
-    });
-    judge(&lasting, findings);
-    for (k, seen) in seen.iter().enumerate() {
-        unsteady(k, seen, findings);
-    }
-}
-
-/// How a sensor did from its first good sample on.
-#[derive(Debug, Clone, Copy, Default)]
-struct Seen {
-    good: u32,
-    bad: u32,
-    worst: Option<Health>,
-}
-
-impl Seen {
-    fn take(&mut self, health: Health) {
-        if health.is_good() {
-            self.good += 1;
-        } else if self.good > 0 {
-            self.bad += 1;
-            self.worst = Some(health);
-        }
-    }
-}
-
-/// Tells of a sensor that comes and goes. One lost sample in five is more than a healthy line loses.
-fn unsteady(k: usize, seen: &Seen, findings: &mut Findings) {
-    let Seen {
-        good,
-        bad,
-        worst: Some(health),
-    } = *seen
-    else {
-        return;
-    };
-    if 4 * bad > good {
-        findings.note(
-            "sensors",
-            format!(
-                "{} gives {good} samples of {}: {health}",
-                SEGMENT_NAMES[k],
-                good + bad
-            ),
-            "its plug and cable; a PC with less other work",
-        );
-    }
-}
-
-fn judge(health: &[Health; SEGMENT_COUNT], findings: &mut Findings) {
-    let lost: Vec<usize> = (0..SEGMENT_COUNT)
-        .filter(|k| !health[*k].is_good())
-        .collect();
-    if lost.is_empty() {
-        return findings.good("sensors", "all 16 give orientations");
-    }
-    let mux = |k: &&usize| matches!(health[**k], Health::Missing(imu::Error::Mux(_)));
-    if lost.len() == SEGMENT_COUNT && lost.iter().all(|k| mux(&k)) {
-        return findings.wrong(
-            "multiplexer",
-            format!(
-                "the I2C multiplexer answers, but selects no channel: {}",
-                health[0]
-            ),
-            "SDA and SCL between serial bridge and multiplexer, and their pull-ups",
-        );
-    }
-    if lost.len() == SEGMENT_COUNT {
-        return findings.wrong(
-            "sensors",
-            format!(
-                "none of the 16 gives an orientation; the first, {}: {}",
-                SEGMENT_NAMES[0], health[0]
-            ),
-            "the sensors' power, and the cable between multiplexer and sensors",
-        );
-    }
-    for pair in lost.chunk_by(|a, b| imu::channel(*a) == imu::channel(*b)) {
-        match *pair {
-            [a, b] => findings.wrong(
-                "sensors",
-                format!(
-                    "both sensors of channel {}: {}: {}; {}: {}",
-                    imu::channel(a),
-                    SEGMENT_NAMES[a],
-                    health[a],
-                    SEGMENT_NAMES[b],
-                    health[b]
-                ),
-                "that channel's cable, its pull-ups, and the power of its sensors",
-            ),
-            _ => pair
-                .iter()
-                .for_each(|k| one_missing(*k, &health[*k], findings)),
-        }
-    }
-}
-
-fn one_missing(k: usize, health: &Health, findings: &mut Findings) {
-    findings.wrong(
-        "sensors",
-        format!(
-            "{} (channel {}, address {:#04X}): {health}",
-            SEGMENT_NAMES[k],
-            imu::channel(k),
-            imu::address(k),
-        ),
-        "its plug and power; its address pin (COM3: low is 0x28, high is 0x29)",
-    );
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::diagnose::Verdict;
-    use glove::bus;
-
-    fn judged(health: [Health; SEGMENT_COUNT]) -> Findings {
-        let mut findings = Findings::default();
-        judge(&health, &mut findings);
-        findings
-    }
-
-    #[test]
-    fn a_dead_multiplexer_a_dead_channel_and_a_lone_sensor_are_one_finding_each() {
-        let mux = Health::Missing(imu::Error::Mux(bus::Error::NackAddress));
-        let findings = judged([mux; SEGMENT_COUNT]);
-        assert_eq!(findings.faults(), 1);
-        assert_eq!(findings.0[0].layer, "multiplexer");
-        let mut health = [Health::Good; SEGMENT_COUNT];
-        health[3] = Health::Missing(imu::Error::ChipId(0));
-        health[6] = Health::Starting;
-        let findings = judged(health);
-        assert_eq!(findings.faults(), 2);
-        assert!(findings.0[0].what.contains(SEGMENT_NAMES[3]));
-        assert!(findings.0[0].what.contains("channel 1, address 0x29"));
-        health[7] = Health::Missing(imu::Error::ChipId(0));
-        let findings = judged(health);
-        assert_eq!(findings.faults(), 2);
-        assert!(findings.0[1].what.contains("both sensors of channel 3"));
-        let findings = judged([Health::Good; SEGMENT_COUNT]);
-        assert!(findings.0.iter().all(|f| f.verdict == Verdict::Good));
-    }
 }

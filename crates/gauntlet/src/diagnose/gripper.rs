@@ -3,167 +3,205 @@
 use std::path::Path;
 use std::time::{Duration, Instant};
 
+use bridge::Platform;
 use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::registers::two_finger;
+use gripper::registers::{Kind, two_finger};
 use gripper::{Activation, Fault, Gripper, Status};
 
-use super::Findings;
+use super::answer::Came;
 use super::glove::glove_answers;
-use super::raw::{Heard, ask_status};
-use super::search::{Found, OTHER_BAUDS, Outcome, TRIES, UNIT, persist, search};
+use super::place::{Asked, Place, kind_of};
+use super::raw::{hex, text};
+use super::search::{Found, OTHER_BAUDS, Outcome, TRIES, search};
+use super::serial::{exchange, exchanges, words};
+use super::{Findings, network};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::line::{Line, Settings};
-use crate::platform::Clock;
+use crate::line::Line;
+use crate::platform::{Clock, Pc};
 use crate::port::{BAUD, Port};
-use crate::{ports, tcp, words};
+use crate::{ports, tcp};
 
-/// For an answer to a longer read.
+/// For an answer to a longer read, where answers are not late.
 const WAIT: Duration = Duration::from_millis(80);
-/// Units that gateways and other programs use instead of the gripper's own.
-const OTHER_TCP_UNITS: [u8; 4] = [9, 1, 255, 0];
 /// Reads to see how well the line does.
 const SAMPLE: Duration = Duration::from_secs(1);
+/// The longest wait between two looks.
+const LOOK: gripper::Duration = gripper::Duration::from_millis(1);
 
-/// Finds out which layer of the gripper at `path` (a serial port, or `tcp:HOST[:PORT]`) fails.
-pub fn gripper(path: &Path, interrupt: &Interrupt) -> Findings {
+/// Finds out which layer of the gripper at `path` (a serial port, or `tcp:HOST[:PORT]`) fails. Ends by itself, whatever
+/// comes: within half a minute on a serial line, within 15 s over TCP.
+pub fn gripper(path: &Path, asked: Asked, interrupt: &Interrupt) -> Findings {
+    examine(Place { path, asked }, true, interrupt)
+}
+
+/// Why no gripper answers at `path`, in a few seconds: without looking for it elsewhere.
+///
+/// The failure begins with `what` and says what came instead of an answer; the next step can be pasted.
+pub fn no_gripper(what: &str, path: &Path, asked: Asked, interrupt: &Interrupt) -> Failure {
+    let place = Place { path, asked };
+    let findings = examine(place, false, interrupt);
+    if interrupt.asked() {
+        return Failure::interrupted("while the gripper was looked for");
+    }
+    match findings.first_wrong() {
+        Some(wrong) => Failure::new(
+            format!("{what}: {}", wrong.what),
+            wrong.next.clone().unwrap_or_default(),
+        ),
+        None => Failure::new(
+            format!("{what} in time, though it answers single questions"),
+            place.command("doctor"),
+        ),
+    }
+}
+
+/// `thorough`: a gripper that does not answer is looked for at other speeds and under other units.
+fn examine(place: Place<'_>, thorough: bool, interrupt: &Interrupt) -> Findings {
     let mut findings = Findings::default();
-    match tcp::Address::parse(path) {
+    match tcp::Address::parse(place.path) {
         Err(failure) => findings.failure("address", &failure),
-        Ok(Some(address)) => network(&address, &mut findings, interrupt),
-        Ok(None) => serial(path, &mut findings, interrupt),
+        Ok(Some(address)) => network::network(&address, &place, &mut findings, interrupt),
+        Ok(None) => serial(&place, thorough, &mut findings, interrupt),
     }
     findings
 }
 
-fn network(address: &tcp::Address, findings: &mut Findings, interrupt: &Interrupt) {
-    let port = match tcp::Port::connect(address, tcp::UNIT, interrupt) {
-        Ok(port) => port,
-        Err(error) => {
-            let (text, _) = crate::failure::report(&error);
-            let (what, next) = text.split_once("\n  try: ").unwrap_or((&text, ""));
-            return findings.wrong("connection", what.trim_start_matches("error: "), next);
-        }
-    };
-    findings.good("connection", format!("{address} accepts"));
-    let error = match network_status(port, interrupt) {
-        Ok(status) => return says(&status, "3-Finger gripper", findings),
-        Err(error) => error,
-    };
-    let silent = matches!(error, tcp::Error::Timeout | tcp::Error::Exception(_));
-    for unit in OTHER_TCP_UNITS.into_iter().filter(|_| silent) {
-        let Ok(port) = tcp::Port::connect(address, unit, interrupt) else {
-            continue;
-        };
-        if let Ok(status) = network_status(port, interrupt) {
-            findings.wrong(
-                "unit",
-                format!("unit {unit} answers, not unit {}", tcp::UNIT),
-                format!("`gauntlet gripper … --unit {unit}`"),
-            );
-            return says(&status, "3-Finger gripper", findings);
-        }
-    }
-    if interrupt.asked() {
-        return interrupted(findings);
-    }
-    let tried = OTHER_TCP_UNITS.map(|unit| unit.to_string()).join(", ");
-    let what = if silent {
-        format!("{error}; asked unit {}, then {tried}", tcp::UNIT)
-    } else {
-        error.to_string()
-    };
-    findings.wrong("gripper", what, error.next_step());
-}
-
-/// Reads for a second; the newest status, or what is wrong with the line.
-fn network_status(port: tcp::Port, interrupt: &Interrupt) -> Result<Status<4>, tcp::Error> {
-    let config = port.driver_config();
-    let mut driver = ThreeFinger::new(Line::Tcp(port), config);
-    sample(&mut driver, interrupt)
-        .ok_or_else(|| driver.serial_mut().error().unwrap_or(tcp::Error::Timeout))
-}
-
-fn interrupted(findings: &mut Findings) {
+pub(super) fn interrupted(findings: &mut Findings) {
     findings.note("search", "interrupted before it was done", "again");
 }
 
-fn serial(path: &Path, findings: &mut Findings, interrupt: &Interrupt) {
-    let mut port = match Port::open(path, BAUD) {
+fn serial(place: &Place<'_>, thorough: bool, findings: &mut Findings, interrupt: &Interrupt) {
+    let (unit, baud) = (place.unit(), place.baud());
+    let mut port = match Port::open(place.path, baud) {
         Ok(port) => port,
         Err(error) => return findings.failure("port", &Failure::from(error)),
     };
-    findings.good("port", format!("{} opens", path.display()));
-    if let Some(warning) = ports::latency_warning(path) {
-        findings.note("port", warning, "the command above");
+    findings.good("port", format!("{} opens", place.path.display()));
+    if let Some((what, next)) = ports::latency_fault(place.path) {
+        findings.note("port", what, next);
     }
-    let first = persist(&mut port, UNIT, interrupt);
-    if let Heard::Answer(_, echoes) = first {
-        if echoes {
-            let what = "the adapter gives back what it is given; the driver takes that off";
-            findings.note("line", what, "nothing: it works");
-        }
-        let what = format!("unit {UNIT} answers at {BAUD} baud");
+    let tally = exchanges(&mut port, unit, baud, interrupt);
+    if tally.is_answered() {
+        let what = format!("unit {unit} answers at {baud} baud");
         findings.good("line", what);
-        return talk(port, Settings::default(), findings, interrupt);
+        let needed = tally.tell(place, findings);
+        let place = needed.map_or(*place, |needed| place.with_patience(needed));
+        return talk(port, &place, findings, interrupt);
     }
     drop(port);
-    if let Heard::Exception(code) = first {
-        return findings.wrong(
-            "unit",
-            format!("unit {UNIT} refuses a status read with exception {code:02X}"),
-            "whether this device is a Robotiq gripper",
-        );
+    let instead = tally.instead();
+    let is_spoiled = matches!(
+        instead,
+        Came::Exception(_)
+            | Came::OtherQuestion
+            | Came::Headless
+            | Came::Cut { .. }
+            | Came::Damaged
+    );
+    if interrupt.asked() {
+        return interrupted(findings);
     }
-    if glove_answers(path, interrupt) {
+    if is_spoiled {
+        return spoiled(place, &instead, findings);
+    }
+    if glove_answers(place.path, interrupt) {
         return findings.wrong(
             "line",
             "this is the glove's port: its serial bridge (SC18IM) answers, no gripper",
             "the other port for --gripper (`gauntlet ports`)",
         );
     }
-    match search(path, &first, interrupt) {
-        Outcome::Found(found) => elsewhere(path, found, findings, interrupt),
-        Outcome::Nobody(searched) => nobody(&first, &searched, findings),
+    let outcome = match instead {
+        Came::OtherUnit(unit) => Outcome::Found(Found { baud, unit }),
+        _ if thorough => search(place, &instead, interrupt),
+        _ => Outcome::Nobody(Vec::new()),
+    };
+    match outcome {
+        Outcome::Found(found) => elsewhere(place, found, findings, interrupt),
+        Outcome::Nobody(searched) if thorough => {
+            let tried = tried(place, &searched);
+            nobody(&instead, tally.unasked(), &tried, None, findings);
+        }
+        Outcome::Nobody(_) => {
+            let tried = format!("asked unit {unit} at {baud} baud");
+            let doctor = place.command("doctor");
+            nobody(&instead, tally.unasked(), &tried, Some(&doctor), findings);
+        }
         Outcome::Interrupted => interrupted(findings),
     }
 }
 
-/// Somebody answers, but not where a gripper does as delivered.
-fn elsewhere(path: &Path, found: Found, findings: &mut Findings, interrupt: &Interrupt) {
-    let Found { baud, unit } = found;
-    let (other_baud, other_unit) = (baud != BAUD, unit != UNIT);
-    let mut options = String::new();
-    if other_baud {
-        options.push_str(&format!(" --baud {baud}"));
-    }
-    if other_unit {
-        options.push_str(&format!(" --unit {unit}"));
-    }
-    let next = format!(
-        "`gauntlet gripper …{options}`, or set unit {UNIT} and {BAUD} baud in the maker's tool"
-    );
-    if other_baud {
-        let what = format!("it answers at {baud} baud, not at {BAUD}");
-        findings.wrong("line", what, &next);
-    }
-    if other_unit {
-        let what = format!("unit {unit} answers at {baud} baud, not unit {UNIT}");
-        findings.wrong("unit", what, &next);
-    }
-    let settings = Settings {
-        baud: other_baud.then_some(baud),
-        unit: other_unit.then_some(unit),
-        ..Settings::default()
+/// A device understands, and what it answers is no answer to use.
+fn spoiled(place: &Place<'_>, came: &Came, findings: &mut Findings) {
+    let unit = place.unit();
+    let (layer, what, next) = match came {
+        Came::Exception(code) => (
+            "unit",
+            format!(
+                "unit {unit} refuses a status read with exception {code:02X}, {}",
+                gripper::rtu::Exception(*code).meaning()
+            ),
+            "whether this device is a Robotiq gripper, or a gateway whose setting for its serial side is wrong",
+        ),
+        Came::OtherQuestion => (
+            "line",
+            "answers come late: more than a second after the question, that of the one before instead of the new one"
+                .to_owned(),
+            "the tunnel's or the adapter's own delay: Gauntlet waits for no answer that long",
+        ),
+        Came::Headless => (
+            "line",
+            "the first byte of each answer is missing: the frame after it is whole".to_owned(),
+            "the adapter switches its direction too late, or the bus lacks bias: another adapter (one that switches by \
+             itself), a pull-up and a pull-down on the bus",
+        ),
+        other => (
+            "line",
+            format!("unit {unit} answers, but {}", words(other)),
+            "RS-485 A against B, ground and termination; whether another program or device talks on this line",
+        ),
     };
-    reopen(path, settings, findings, interrupt);
+    findings.wrong(layer, what, next);
 }
 
-fn nobody(first: &Heard, searched: &[u32], findings: &mut Findings) {
+/// Somebody answers, but not where the gripper was asked.
+fn elsewhere(place: &Place<'_>, found: Found, findings: &mut Findings, interrupt: &Interrupt) {
+    let Found { baud, unit } = found;
+    let (asked_baud, asked_unit) = (place.baud(), place.unit());
+    let there = place.with_baud(baud).with_unit(unit);
+    let next = format!(
+        "{}, or set unit {asked_unit} and {asked_baud} baud in the maker's tool",
+        there.command("gripper status")
+    );
+    if baud != asked_baud {
+        let what = format!("it answers at {baud} baud, not at {asked_baud}");
+        findings.wrong("line", what, &next);
+    }
+    if unit != asked_unit {
+        let what = format!("unit {unit} answers at {baud} baud, not unit {asked_unit}");
+        findings.wrong("unit", what, &next);
+    }
+    match Port::open(place.path, baud) {
+        Ok(mut port) => {
+            let tally = exchanges(&mut port, unit, baud, interrupt);
+            let needed = tally.tell(&there, findings);
+            let there = needed.map_or(there, |needed| there.with_patience(needed));
+            talk(port, &there, findings, interrupt);
+        }
+        Err(error) => findings.failure("port", &Failure::from(error)),
+    }
+}
+
+/// What a search asked.
+fn tried(place: &Place<'_>, searched: &[u32]) -> String {
+    let baud = place.baud();
+    let others = OTHER_BAUDS.iter().chain(&[BAUD]).filter(|b| **b != baud);
     let mut tried = format!(
-        "asked unit {UNIT} at {BAUD} and {} other speeds",
-        OTHER_BAUDS.len()
+        "asked unit {} at {baud} and {} other speeds",
+        place.unit(),
+        others.count()
     );
     if !searched.is_empty() {
         let speeds: Vec<String> = searched.iter().map(u32::to_string).collect();
@@ -172,55 +210,175 @@ fn nobody(first: &Heard, searched: &[u32], findings: &mut Findings) {
             speeds.join(", ")
         ));
     }
-    match first {
-        Heard::Noise(count) => findings.wrong(
-            "line",
-            format!("bytes come but no Modbus frame: {count} bytes at {BAUD} baud; {tried}"),
+    tried
+}
+
+/// Nothing that is known came. `doctor`: the command that looks further.
+fn nobody(came: &Came, unasked: &[u8], tried: &str, doctor: Option<&str>, findings: &mut Findings) {
+    let further = doctor.map_or_else(String::new, |doctor| format!("; then {doctor}"));
+    let (what, next) = match came {
+        Came::Noise(_) if !unasked.is_empty() => (
+            format!(
+                "bytes come without being asked for: {} in 0.1 s{}; {tried}",
+                unasked.len(),
+                sample_of(unasked)
+            ),
+            "whether this is the gripper's port (`gauntlet ports`): something that talks by itself is on it",
+        ),
+        Came::Noise(bytes) => (
+            format!(
+                "bytes come but no Modbus frame: {} bytes{}; {tried}",
+                bytes.len(),
+                sample_of(bytes)
+            ),
             "whether this is the gripper's port and not the glove's; RS-485 A against B, ground and termination",
         ),
-        Heard::Echo => findings.wrong(
-            "line",
+        Came::Echo => (
             format!("only the adapter's own echo comes back; {tried}"),
             "the gripper's 24 V supply, and RS-485 A against B",
         ),
-        _ => findings.wrong(
-            "line",
+        _ => (
             format!("no byte comes; {tried}"),
-            "the gripper's 24 V supply, RS-485 A against B, and whether this is the gripper's port (`gauntlet ports`)",
+            "the gripper's 24 V supply, RS-485 A against B, and whether this is the gripper's port, not the glove's \
+             (`gauntlet ports`)",
         ),
-    }
+    };
+    findings.wrong("line", what, format!("{next}{further}"));
 }
 
-fn reopen(path: &Path, settings: Settings, findings: &mut Findings, interrupt: &Interrupt) {
-    match Port::open(path, settings.baud.unwrap_or(BAUD)) {
-        Ok(port) => talk(port, settings, findings, interrupt),
-        Err(error) => findings.failure("port", &Failure::from(error)),
+fn sample_of(bytes: &[u8]) -> String {
+    match text(bytes) {
+        Some(text) => format!(", text (“{text}”)"),
+        None => format!(" ({})", hex(bytes)),
     }
 }
 
 /// Somebody answers: which gripper is it, and what does it say?
-fn talk(mut port: Port, settings: Settings, findings: &mut Findings, interrupt: &Interrupt) {
-    let unit = settings.unit.unwrap_or(UNIT);
+fn talk(mut port: Port, place: &Place<'_>, findings: &mut Findings, interrupt: &Interrupt) {
+    let (unit, baud) = (place.unit(), place.baud());
+    let wait = WAIT.max(place.patience());
     // Only the 3-Finger has eight status registers.
     let three = (0..TRIES).any(|_| {
-        let heard = ask_status(&mut port, unit, 8, WAIT, interrupt);
-        matches!(heard, Heard::Answer(..))
+        let (came, _) = exchange(&mut port, unit, baud, 8, wait, interrupt);
+        matches!(came, Came::Answer(_))
     });
-    let config = Line::serial_config(settings);
-    let counters = if three {
+    let kind = if three {
+        Kind::ThreeFinger
+    } else {
+        Kind::TwoFinger
+    };
+    let config = gripper::driver::Config {
+        check_family: false,
+        ..Line::serial_config(place.asked.settings)
+    };
+    let watch = port.watch();
+    let mut pc = Pc::new(Clock::start(), [watch], interrupt.clone());
+    let there = place.with_kind(kind);
+    if three {
         let mut driver = ThreeFinger::new(port, config);
-        heard(sample(&mut driver, interrupt), "3-Finger gripper", findings);
-        driver.counters()
+        let sampled = sample(&mut driver, &mut pc, interrupt);
+        told(&sampled, kind, &there, findings);
     } else {
         // The members of the family answer alike.
-        let mut driver = TwoFinger::new(port, two_finger::Model::default(), config);
-        let name = "2-Finger gripper or Hand-E";
-        heard(sample(&mut driver, interrupt), name, findings);
-        driver.counters()
-    };
+        let model = place.asked.model.and_then(|model| model.two_finger());
+        let mut driver =
+            TwoFinger::new(port, model.unwrap_or(two_finger::Model::default()), config);
+        let sampled = sample(&mut driver, &mut pc, interrupt);
+        told(&sampled, kind, &there, findings);
+    }
+    if let Some(model) = place.asked.model.filter(|model| kind_of(*model) != kind) {
+        let what = format!("a {} answers, not a {}", kind.name(), model.name());
+        let next = match kind {
+            Kind::ThreeFinger => "--gripper-model 3f, or nothing: it is the usual one",
+            Kind::TwoFinger => {
+                "--gripper-model 2f85, 2f140 or hande: which of them it is no register says"
+            }
+        };
+        findings.wrong("gripper", what, next);
+    }
+}
+
+/// What a second of reading came to.
+pub(super) struct Sampled<const X: usize> {
+    newest: Option<Status<X>>,
+    last_error: Option<gripper::Error>,
+    counters: gripper::link::Counters,
+    statuses: u32,
+    seconds: f64,
+}
+
+impl<const X: usize> Sampled<X> {
+    pub(super) fn newest(&self) -> Option<Status<X>> {
+        self.newest
+    }
+
+    /// Statuses a second.
+    pub(super) fn rate(&self) -> f64 {
+        f64::from(self.statuses) / self.seconds
+    }
+}
+
+/// Reads for a second.
+pub(super) fn sample<S, F, const X: usize>(
+    driver: &mut gripper::driver::Driver<S, F, X>,
+    pc: &mut Pc,
+    interrupt: &Interrupt,
+) -> Sampled<X>
+where
+    S: Read + ReadReady + Write,
+    F: gripper::driver::Family<X>,
+{
+    let start = Instant::now();
+    let (mut newest, mut last_error, mut statuses) = (None, None, 0);
+    while start.elapsed() < SAMPLE && !interrupt.asked() {
+        let now = pc.now();
+        match driver.poll(now) {
+            Some(Ok(status)) => {
+                newest = Some(status);
+                statuses += 1;
+            }
+            Some(Err(error)) => last_error = Some(error),
+            None => {}
+        }
+        pc.wait_until(driver.next_due().clamp(now, now + LOOK));
+    }
+    Sampled {
+        newest,
+        last_error,
+        counters: driver.counters(),
+        statuses,
+        seconds: start.elapsed().as_secs_f64(),
+    }
+}
+
+fn told<const X: usize>(
+    sampled: &Sampled<X>,
+    kind: Kind,
+    place: &Place<'_>,
+    findings: &mut Findings,
+) {
+    match sampled.newest {
+        Some(status) => {
+            findings.good("line", format!("{:.1} cycles/s", sampled.rate()));
+            says(&status, kind, place, findings);
+        }
+        // What is wrong with the line was told.
+        None if findings.faults() > 0 => {}
+        None => {
+            let why = sampled
+                .last_error
+                .map_or_else(String::new, |error| format!(": {error}"));
+            findings.wrong(
+                "gripper",
+                format!("it answers single questions but gives no valid status{why}"),
+                "whether this device is a Robotiq gripper",
+            );
+        }
+    }
+    let counters = &sampled.counters;
     let (asked, answered) = (counters.requests, counters.replies);
     let lost = asked.saturating_sub(answered.saturating_add(1));
-    if lost > 0 {
+    if lost > 0 && sampled.newest.is_some() {
         let what = format!(
             "{lost} of {asked} requests had no good answer in {} s: {} with a wrong CRC, {} late, {} silent",
             SAMPLE.as_secs(),
@@ -228,64 +386,53 @@ fn talk(mut port: Port, settings: Settings, findings: &mut Findings, interrupt: 
             counters.stale,
             counters.timeouts
         );
-        findings.note(
-            "line",
-            what,
-            "cable, ground and termination; a PC with less other work",
-        );
+        let next = "cable, ground and termination; a PC with less other work";
+        findings.by_share("line", lost as usize, asked as usize, what, next);
     }
 }
 
-fn heard<const X: usize>(status: Option<Status<X>>, name: &str, findings: &mut Findings) {
-    match status {
-        Some(status) => says(&status, name, findings),
-        None => findings.wrong(
-            "gripper",
-            "it answers single questions but gives no valid status",
-            "whether this device is a Robotiq gripper",
-        ),
-    }
-}
-
-/// Reads for a second; the newest status.
-fn sample<S, F, const X: usize>(
-    driver: &mut gripper::driver::Driver<S, F, X>,
-    interrupt: &Interrupt,
-) -> Option<Status<X>>
-where
-    S: Read + ReadReady + Write,
-    F: gripper::driver::Family<X>,
-{
-    let clock = Clock::start();
-    let start = Instant::now();
-    let mut newest = None;
-    while start.elapsed() < SAMPLE && !interrupt.sleep(Duration::from_millis(1)) {
-        if let Some(Ok(status)) = driver.poll(clock.now()) {
-            newest = Some(status);
-        }
-    }
-    newest
-}
-
-fn says<const X: usize>(status: &Status<X>, name: &str, findings: &mut Findings) {
+/// What the gripper says of itself.
+pub(super) fn says<const X: usize>(
+    status: &Status<X>,
+    kind: Kind,
+    place: &Place<'_>,
+    findings: &mut Findings,
+) {
+    let name = kind.name();
     match status.fault {
         Fault::None => findings.good("gripper", format!("{name}, no fault")),
         fault => findings.wrong(
             "gripper",
             format!("{name}, fault {:02X}: {}", fault.code(), fault.sentence()),
-            fault.action(),
+            format!("{} {}", fault.action(), cure(fault, place)).trim(),
         ),
     }
-    let what = format!("it is {}", words::activation(status.activation));
+    let what = format!("it is {}", crate::words::activation(status.activation));
     match status.activation {
         Activation::Ready => findings.good("gripper", what),
         Activation::Reset => findings.note(
             "gripper",
             what,
-            "`gauntlet gripper activate`: the fingers move",
+            format!("{}: the fingers move", place.command("gripper activate")),
         ),
         Activation::Activating | Activation::ChangingMode => {
             findings.note("gripper", what, "waiting until it is done");
         }
+    }
+}
+
+/// The command for what a fault's action asks for.
+fn cure(fault: Fault, place: &Place<'_>) -> String {
+    let action = fault.action();
+    if action.contains("eset and activate") {
+        let (reset, activate) = (
+            place.command("gripper reset"),
+            place.command("gripper activate"),
+        );
+        format!("({reset}, then {activate}: it lets go, then its fingers move)")
+    } else if action.starts_with("Activate it") {
+        format!("({})", place.command("gripper activate"))
+    } else {
+        String::new()
     }
 }

@@ -1,48 +1,108 @@
-//! One question on a port, and whatever comes back, byte by byte: the drivers would hide what is wrong.
+//! One question on a port, and whatever comes back with its times, byte by byte: the drivers would hide what is wrong.
 
 use std::time::{Duration, Instant};
 
 use embedded_io::{Read, ReadReady, Write};
-use gripper::rtu::{Frame, Request};
 
 use crate::interrupt::Interrupt;
 use crate::port::Port;
 
 /// Silence that ends an answer: longer than an adapter's 16 ms latency timer.
 const QUIET: Duration = Duration::from_millis(20);
+/// Silence after bytes that are no answer, after which none is expected: a slow tunnel pauses between its pieces.
+const GIVEN_UP: Duration = Duration::from_millis(150);
 /// Pause between two looks.
 const LOOK: Duration = Duration::from_millis(1);
 /// More bytes than this are no answer to anything asked here.
 const MOST: usize = 512;
 
-/// Sends `bytes` and collects what comes: until `enough` bytes are there and the line is quiet, for `wait` at most.
+/// What came after a question.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Heard {
+    /// The bytes.
+    pub bytes: Vec<u8>,
+    /// From the question to the first byte that is no echo of it.
+    pub first: Duration,
+    /// From the question to the last byte of the answer; to the last byte where none came.
+    pub last: Duration,
+}
+
+/// What is still to be expected.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Expect {
+    /// The answer: these bytes are none, or only its beginning.
+    Answer,
+    /// Nothing: the answer is there.
+    Nothing,
+    /// The answer, however long it takes: these bytes are the adapter's own echo.
+    AnswerAfterEcho,
+}
+
+/// Sends `bytes` and collects what comes, until nothing more is expected, for `wait` at most whatever comes.
 pub fn ask(
     port: &mut Port,
     bytes: &[u8],
-    enough: usize,
     wait: Duration,
     interrupt: &Interrupt,
-) -> Vec<u8> {
+    expect: impl Fn(&[u8]) -> Expect,
+) -> Heard {
     discard(port);
-    let mut heard = Vec::new();
+    let mut heard = Heard::default();
     if port.write(bytes) != Ok(bytes.len()) {
         return heard;
     }
-    let (start, mut last) = (Instant::now(), Instant::now());
-    while start.elapsed() < wait && heard.len() < MOST {
+    collect(port, &mut heard, wait, interrupt, expect);
+    heard
+}
+
+/// Listens for `time`, or until more came than anybody says unasked.
+pub fn listen(port: &mut Port, time: Duration, interrupt: &Interrupt) -> Vec<u8> {
+    let mut heard = Heard::default();
+    let expect = |_: &[u8]| Expect::AnswerAfterEcho;
+    collect(port, &mut heard, time, interrupt, expect);
+    heard.bytes
+}
+
+fn collect(
+    port: &mut Port,
+    heard: &mut Heard,
+    wait: Duration,
+    interrupt: &Interrupt,
+    expect: impl Fn(&[u8]) -> Expect,
+) {
+    let start = Instant::now();
+    let mut last = start;
+    let mut expected = Expect::Answer;
+    while start.elapsed() < wait && heard.bytes.len() < MOST {
         let mut chunk = [0; 64];
         if port.read_ready() == Ok(true)
             && let Ok(count) = port.read(&mut chunk)
         {
-            heard.extend_from_slice(&chunk[..count]);
+            heard.bytes.extend_from_slice(&chunk[..count]);
             last = Instant::now();
-        } else if (heard.len() >= enough && last.elapsed() >= QUIET) || interrupt.sleep(LOOK) {
-            break;
+            if heard.bytes.len() == count || expected == Expect::AnswerAfterEcho {
+                heard.first = start.elapsed();
+            }
+            // What comes after the answer does not make it late.
+            if expected != Expect::Nothing {
+                heard.last = start.elapsed();
+            }
+            expected = expect(&heard.bytes);
+            continue;
+        }
+        let quiet = last.elapsed();
+        let over = match expected {
+            Expect::Nothing => quiet >= QUIET,
+            Expect::Answer => !heard.bytes.is_empty() && quiet >= GIVEN_UP,
+            Expect::AnswerAfterEcho => false,
+        };
+        if over || interrupt.sleep(LOOK) {
+            return;
         }
     }
-    heard
 }
 
+/// Throws away what is there, 4 kB at most.
 fn discard(port: &mut Port) {
     for _ in 0..64 {
         if port.read_ready() != Ok(true) || port.read(&mut [0; 64]).is_err() {
@@ -51,93 +111,43 @@ fn discard(port: &mut Port) {
     }
 }
 
-/// What came after a Modbus RTU request.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Heard {
-    /// Nothing.
-    Silence,
-    /// The answer: register bytes; and whether the adapter echoes what it is given.
-    Answer(Vec<u8>, bool),
-    /// The device says no.
-    Exception(u8),
-    /// A valid frame of another unit.
-    Other(u8),
-    /// Only a copy of the request.
-    Echo,
-    /// Bytes that make no frame.
-    Noise(usize),
+/// The text in these bytes, where they are text: what a console or a log says.
+pub fn text(bytes: &[u8]) -> Option<String> {
+    let readable =
+        |byte: &&u8| byte.is_ascii_graphic() || matches!(byte, b' ' | b'\r' | b'\n' | b'\t');
+    let count = bytes.iter().filter(readable).count();
+    // Noise has one readable byte in three.
+    if bytes.len() < 4 || count * 10 < bytes.len() * 9 {
+        return None;
+    }
+    let words = String::from_utf8_lossy(bytes);
+    let clean: String = words.chars().filter(|c| !c.is_control()).take(40).collect();
+    Some(clean.trim().to_owned())
 }
 
-/// Judges what came after `request`.
-pub fn judge(unit: u8, request: &Request<'_>, sent: &[u8], heard: &[u8]) -> Heard {
-    let echoed = heard.starts_with(sent);
-    let rest = if echoed { &heard[sent.len()..] } else { heard };
-    let frame = |length: usize| {
-        let frame = Frame::new_checked(rest.get(..length)?).ok()?;
-        Some((frame.unit(), frame.function(), frame.pdu()))
-    };
-    if rest.is_empty() {
-        return if echoed { Heard::Echo } else { Heard::Silence };
-    }
-    match frame(request.reply_len()) {
-        Some((from, function, pdu)) if from == unit && function == request.function() => {
-            return Heard::Answer(pdu.get(2..).unwrap_or(&[]).to_vec(), echoed);
-        }
-        Some((from, ..)) => return Heard::Other(from),
-        None => {}
-    }
-    match frame(gripper::rtu::EXCEPTION_FRAME) {
-        Some((from, _, pdu)) if from == unit => Heard::Exception(pdu.get(1).copied().unwrap_or(0)),
-        Some((from, ..)) => Heard::Other(from),
-        None => Heard::Noise(rest.len()),
-    }
-}
-
-/// Asks `unit` for `quantity` status registers with FC03.
-pub fn ask_status(
-    port: &mut Port,
-    unit: u8,
-    quantity: u16,
-    wait: Duration,
-    interrupt: &Interrupt,
-) -> Heard {
-    let request = Request::ReadHolding {
-        address: gripper::registers::STATUS,
-        quantity,
-    };
-    let mut frame = [0; 16];
-    let Ok(length) = request.emit(unit, &mut frame) else {
-        return Heard::Silence;
-    };
-    let sent = &frame[..length];
-    let heard = ask(port, sent, request.reply_len(), wait, interrupt);
-    judge(unit, &request, sent, &heard)
+/// Bytes as a person writes them, eight at most.
+pub fn hex(bytes: &[u8]) -> String {
+    let shown: Vec<String> = bytes.iter().take(8).map(|b| format!("{b:02X}")).collect();
+    let more = if bytes.len() > 8 { " …" } else { "" };
+    format!("{}{more}", shown.join(" "))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    const REQUEST: Request<'static> = Request::ReadHolding {
-        address: 0x07D0,
-        quantity: 1,
-    };
-    const SENT: [u8; 8] = [0x09, 0x03, 0x07, 0xD0, 0x00, 0x01, 0x85, 0xCF];
-    const REPLY: [u8; 7] = [0x09, 0x03, 0x02, 0x31, 0x00, 0x4C, 0x15];
+    #[test]
+    fn text_is_told_from_noise() {
+        assert_eq!(text(b"login: \r\n"), Some("login:".to_owned()));
+        assert_eq!(text(&[9, 3, 6, 0x31, 0, 0, 1, 2, 3]), None);
+        assert_eq!(text(b"ok"), None);
+        let long = "boot ".repeat(30);
+        assert!(text(long.as_bytes()).is_some_and(|text| text.len() <= 40));
+    }
 
     #[test]
-    fn answers_echoes_and_noise_are_told_apart() {
-        let judge = |heard: &[u8]| judge(9, &REQUEST, &SENT, heard);
-        assert_eq!(judge(&[]), Heard::Silence);
-        assert_eq!(judge(&SENT), Heard::Echo);
-        assert_eq!(judge(&REPLY), Heard::Answer(vec![0x31, 0x00], false));
-        let both = [&SENT[..], &REPLY[..]].concat();
-        assert_eq!(judge(&both), Heard::Answer(vec![0x31, 0x00], true));
-        assert_eq!(judge(&REPLY[1..]), Heard::Noise(6));
-        let mut exception = vec![9, 0x83, 2];
-        exception.extend(gripper::rtu::crc16(&exception).to_le_bytes());
-        assert_eq!(judge(&exception), Heard::Exception(2));
-        let other = super::judge(8, &REQUEST, &SENT, &REPLY);
-        assert_eq!(other, Heard::Other(9));
+    fn bytes_are_written_as_hexadecimal_and_not_without_end() {
+        assert_eq!(hex(&[0, 0xFF]), "00 FF");
+        assert!(hex(&[1; 100]).ends_with('…'));
     }
 }

@@ -3,14 +3,15 @@
 //! Only status reads go out. At a wrong speed some devices answer noise; then the speeds at which the line stays quiet are
 //! the likely ones, and only they are searched for other units.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use embedded_io::{Read, ReadReady, Write};
 use gripper::rtu::{Frame, Request, function};
 use gripper::timing;
 
-use super::raw::{Heard, ask_status};
+use super::Place;
+use super::answer::Came;
+use super::serial::exchange;
 use crate::interrupt::Interrupt;
 use crate::port::{BAUD, Port};
 use crate::ports;
@@ -26,6 +27,8 @@ pub const OTHER_BAUDS: [u32; 5] = [57_600, 38_400, 19_200, 9_600, 230_400];
 pub const TRIES: usize = 3;
 /// For an answer: an adapter with a 16 ms latency timer, and a PC with other work.
 const WAIT: Duration = Duration::from_millis(80);
+/// For an answer of a unit that was heard: it may have been a late one.
+const LATE: Duration = Duration::from_secs(1);
 /// From the end of a question to one of 247 units to the start of its answer; a later one is still heard, and asked again.
 const UNIT_WAIT: Duration = Duration::from_millis(10);
 /// The same behind an adapter that keeps bytes back.
@@ -57,60 +60,66 @@ pub enum Outcome {
 }
 
 /// Asks until there is an answer, a few times.
-pub fn persist(port: &mut Port, unit: u8, interrupt: &Interrupt) -> Heard {
-    let mut worst = Heard::Silence;
+pub fn persist(
+    port: &mut Port,
+    unit: u8,
+    baud: u32,
+    wait: Duration,
+    interrupt: &Interrupt,
+) -> Came {
+    let mut worst = Came::Silence;
     for _ in 0..TRIES {
-        match ask_status(port, unit, REGISTERS, WAIT, interrupt) {
-            answer @ Heard::Answer(..) => return answer,
-            Heard::Silence => {}
+        match exchange(port, unit, baud, REGISTERS, wait, interrupt).0 {
+            answer @ Came::Answer(_) => return answer,
+            Came::Silence => {}
             other => worst = other,
         }
     }
     worst
 }
 
-/// Looks for whoever did not answer as unit 9 at 115200 baud, where `first` came instead.
-pub fn search(path: &Path, first: &Heard, interrupt: &Interrupt) -> Outcome {
-    let mut speeds = vec![(BAUD, first.clone())];
-    for baud in OTHER_BAUDS {
-        if let Ok(mut port) = Port::open(path, baud) {
-            speeds.push((baud, persist(&mut port, UNIT, interrupt)));
+/// Looks for whoever did not answer as it was asked at `place`, where `first` came instead.
+pub fn search(place: &Place<'_>, first: &Came, interrupt: &Interrupt) -> Outcome {
+    let (unit, wait) = (place.unit(), WAIT.max(place.patience()));
+    let mut speeds = vec![(place.baud(), first.clone())];
+    let usual = std::iter::once(BAUD).chain(OTHER_BAUDS);
+    for baud in usual.filter(|baud| *baud != place.baud()) {
+        if let Ok(mut port) = Port::open(place.path, baud) {
+            speeds.push((baud, persist(&mut port, unit, baud, wait, interrupt)));
+        }
+        if interrupt.asked() {
+            return Outcome::Interrupted;
         }
     }
-    for (baud, heard) in &speeds {
-        match *heard {
-            Heard::Answer(..) => {
-                return Outcome::Found(Found {
-                    baud: *baud,
-                    unit: UNIT,
-                });
-            }
-            Heard::Other(unit) => return Outcome::Found(Found { baud: *baud, unit }),
+    for (baud, came) in &speeds {
+        match *came {
+            Came::Answer(_) => return Outcome::Found(Found { baud: *baud, unit }),
+            Came::OtherUnit(unit) => return Outcome::Found(Found { baud: *baud, unit }),
             _ => {}
         }
     }
-    let is_noise = |heard: &Heard| matches!(heard, Heard::Noise(_) | Heard::Exception(_));
+    let is_quiet = |came: &Came| matches!(came, Came::Silence | Came::Echo);
     let quiet: Vec<u32> = speeds
         .iter()
-        .filter(|(_, heard)| !is_noise(heard))
+        .filter(|(_, came)| is_quiet(came))
         .map(|(baud, _)| *baud)
         .collect();
     // Quiet among noisy ones: somebody understands what is said there. Worth asking twice.
     let passes = if quiet.len() < speeds.len() { 2 } else { 1 };
-    units(path, &quiet, passes, interrupt)
+    units(place, &quiet, passes, interrupt)
 }
 
-fn units(path: &Path, bauds: &[u32], passes: u64, interrupt: &Interrupt) -> Outcome {
-    let slow = ports::latency_warning(path).is_some();
+fn units(place: &Place<'_>, bauds: &[u32], passes: u64, interrupt: &Interrupt) -> Outcome {
+    let slow = ports::latency_warning(place.path).is_some();
     let each = u64::from(*UNITS.end());
     let total = passes * each * bauds.len() as u64;
     let mut progress = Progress::start("looking for the gripper", total, false);
     for (round, &baud) in (0..passes).flat_map(|_| bauds).enumerate() {
-        let Ok(mut port) = Port::open(path, baud) else {
+        let Ok(mut port) = Port::open(place.path, baud) else {
             continue;
         };
         let mut heard = Vec::new();
-        for unit in UNITS.filter(|unit| *unit != UNIT) {
+        for unit in UNITS.filter(|unit| *unit != place.unit()) {
             progress.at(round as u64 * each + u64::from(unit), || {
                 format!("unit {unit} at {baud} baud")
             });
@@ -119,7 +128,10 @@ fn units(path: &Path, bauds: &[u32], passes: u64, interrupt: &Interrupt) -> Outc
                 return Outcome::Interrupted;
             }
             if let Some(unit) = answered(&heard)
-                && matches!(persist(&mut port, unit, interrupt), Heard::Answer(..))
+                && matches!(
+                    persist(&mut port, unit, baud, LATE, interrupt),
+                    Came::Answer(_)
+                )
             {
                 return Outcome::Found(Found { baud, unit });
             }

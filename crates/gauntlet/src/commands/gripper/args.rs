@@ -71,6 +71,16 @@ impl Model {
         }
     }
 
+    /// What the command line calls it.
+    pub fn option(self) -> &'static str {
+        match self {
+            Self::ThreeFinger => "3f",
+            Self::TwoFinger85 => "2f85",
+            Self::TwoFinger140 => "2f140",
+            Self::HandE => "hande",
+        }
+    }
+
     /// The 2-Finger or Hand-E model it is, if it is one.
     pub fn two_finger(self) -> Option<two_finger::Model> {
         match self {
@@ -167,14 +177,15 @@ impl Target {
 
     /// `gauntlet doctor` for the same gripper, to be pasted.
     pub fn doctor(&self) -> String {
-        format!("`gauntlet doctor --gripper {}`", quoted(&self.gripper))
+        self.words("doctor", self.patience)
     }
 
     fn command(&self, verb: &str, patience: Option<Duration>) -> String {
-        let mut text = format!(
-            "`gauntlet gripper {verb} --gripper {}",
-            quoted(&self.gripper)
-        );
+        self.words(&format!("gripper {verb}"), patience)
+    }
+
+    fn words(&self, verb: &str, patience: Option<Duration>) -> String {
+        let mut text = format!("`gauntlet {verb} --gripper {}", quoted(&self.gripper));
         if let Some(value) = self.model.to_possible_value()
             && self.model != Model::ThreeFinger
         {
