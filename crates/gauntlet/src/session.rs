@@ -427,6 +427,8 @@ fn sort(kind: &Kind) -> Sort {
         Kind::GripperFault(fault) => *fault != gripper::Fault::None,
         Kind::SensorLost { .. }
         | Kind::SensorRestarted { .. }
+        | Kind::Sensors(_)
+        | Kind::AxisStands { .. }
         | Kind::Glove { answers: false }
         | Kind::Gripper { answers: false }
         | Kind::Calibration(Try::Refused(_))
