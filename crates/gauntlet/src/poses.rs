@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use anyhow::Result;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES, LIMITS};
-use rig::PoseSource;
+use rig::{FlatFirst, PoseSource};
 use trainer::data::{Error, Matrix, Poses, read_poses, require_rows};
 use trainer::measures::NEIGHBOURS;
 use trainer::motion::{FRAMES, Generator, RATE_HZ};
@@ -109,7 +109,13 @@ impl Motion {
         }
     }
 
-    /// The motion as a virtual hand makes it, in real time and for ever.
+    /// The hand in a virtual glove: it lies flat when the glove's port is opened, to be calibrated, then moves as
+    /// [`Motion::source`] does.
+    pub fn virtual_hand(&self) -> Box<dyn PoseSource> {
+        Box::new(FlatFirst::new(self.source()))
+    }
+
+    /// The motion in real time and for ever.
     pub fn source(&self) -> Box<dyn PoseSource> {
         match self {
             Self::Generated { seed } => {

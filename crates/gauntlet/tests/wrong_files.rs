@@ -199,7 +199,8 @@ fn wrong_words_are_usage_errors() {
         &["fly"][..],
         &["demo", "--seconds", "0"],
         &["train", "--poses", "a.csv"],
-        &["simulate"],
+        &["simulate", "--glove", "/tmp/a", "--gripper-model", "2f85"],
+        &["simulate", "--gripper", "/tmp/a", "--poses", "a.csv"],
         &["teleop", "--glove", "/tmp/a"],
     ] {
         let output = run(arguments);
