@@ -410,7 +410,8 @@ fn hold_confirmed(telemetry: &Telemetry<AXES>, since: Instant) -> bool {
     };
     !sent.follows
         && sent.at >= since
-        && status.stamp > sent.at
+        // A status is as old as its request, and the request that carries the hold asks for its own.
+        && status.stamp >= sent.at
         && status.echo == sent.motion.position
 }
 
