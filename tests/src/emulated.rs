@@ -3,13 +3,15 @@
 use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bridge::State;
+use bridge::calibration::Try;
 use bridge::protocol::message::{Answer, Call, Counters, SlotContents};
 use gauntlet::emulator::{Emulator, Setup};
-use gauntlet::host_link::{Address, Error, HostLink};
+use gauntlet::host_link::{Address, Error, Heartbeat, HostLink};
 use gauntlet::interrupt::Interrupt;
 use gauntlet::realtime;
 use gripper::Activation;
@@ -109,20 +111,36 @@ fn wait_for(link: &mut HostLink, what: &str, done: impl Fn(&mut HostLink) -> boo
     }
 }
 
-/// Keeps the clutch closed for `time`; the states seen.
+/// Closes the clutch and keeps it closed for `time`; the states seen.
 ///
 /// # Panics
-/// The line breaks or the bridge refuses.
+/// The line breaks, the bridge refuses, or the clutch opens by itself.
 pub fn hold_clutch(link: &mut HostLink, time: Duration) -> Vec<State> {
     let end = Instant::now() + time;
+    let (epoch, _) = link.engage().expect("taken");
     let mut states = Vec::new();
     while Instant::now() < end {
-        if let Some(status) = link.engage().expect("taken") {
-            states.push(status.state);
+        match link.heartbeat(epoch).expect("taken") {
+            Heartbeat::Kept(status) => states.push(status.state),
+            Heartbeat::Unanswered => {}
+            Heartbeat::Refused => panic!("the clutch opened by itself: {:?}", link.status()),
         }
         std::thread::sleep(BEAT);
     }
     states
+}
+
+/// Calibrates the bridge on the hand as it lies now.
+fn calibrate(link: &mut HostLink) {
+    link.calibrate_flat_hand().expect("taken");
+    wait_for(link, "the calibration", |link| {
+        let calibration = link.health().expect("an answer").calibration;
+        assert!(
+            !matches!(calibration.newest, Try::Refused(_)),
+            "{calibration:?}"
+        );
+        calibration.is_calibrated
+    });
 }
 
 /// The firmware between the virtual devices, its gripper active, its weights in place.
@@ -156,9 +174,14 @@ impl Loop {
     /// # Panics
     /// Anything does not come up within a minute.
     pub fn start(firmware: &Path) -> Self {
-        let hand = |time_s: f64| {
+        // It lies flat while the sensors come up and the glove is calibrated.
+        let moves = Arc::new(AtomicBool::new(false));
+        let moving = Arc::clone(&moves);
+        let hand = move |time_s: f64| {
             let mut pose = [0.0; 25];
-            pose[5] = 0.6 * (1.0 - (1.5 * time_s).cos()) as f32;
+            if moving.load(Ordering::Relaxed) {
+                pose[5] = 0.6 * (1.0 - (1.5 * time_s).cos()) as f32;
+            }
             pose
         };
         let glove = VirtualGlove::new(Box::new(hand), rig::glove::Config::at_baud(115_200));
@@ -182,11 +205,13 @@ impl Loop {
             link.status().expect("an answer").gripper.is_some()
         });
         assert_eq!(link.status().expect("an answer").state, State::Idle);
+        calibrate(&mut link);
         link.activate().expect("taken");
         wait_for(&mut link, "the activation", |link| {
             let gripper = link.status().expect("an answer").gripper;
             gripper.is_some_and(|gripper| gripper.activation == Activation::Ready)
         });
+        moves.store(true, Ordering::Relaxed);
         Self {
             link,
             gripper,

@@ -2,7 +2,7 @@
 
 use bridge::store::{Expected, WeightsStore};
 use bridge::supervisor::{Hand, Inputs, Supervisor, Weights};
-use bridge::{Config, HoldReason, Instant, State};
+use bridge::{Clutch, Config, HoldReason, Instant, State};
 use gauntlet::slots::MemorySlot;
 use gripper::registers::Fault;
 use gripper::{Activation, Contact, Status};
@@ -148,7 +148,10 @@ fn moves_without_weights() -> bool {
     (1..=4).any(|step| {
         let now = Instant::from_ticks(step * 10_000);
         let inputs = Inputs {
-            heartbeat: Some(now),
+            clutch: Clutch::Closed {
+                epoch: 1,
+                beat: now,
+            },
             hand: Some(Hand {
                 sequence: step as u32,
                 stamp: now,

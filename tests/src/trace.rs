@@ -28,10 +28,14 @@ const SESSION: u32 = 7;
 /// Time between two requests of the host, µs: what a chunk takes on the line, and its reply.
 const REQUEST_EVERY: u64 = 60_000;
 const BEAT: u64 = 100_000;
+/// Of the first closing of the clutch since the start.
+const FIRST_EPOCH: u32 = 1;
 /// Bytes of a slot, as on the board.
 const SLOT: usize = 128 * 1024;
 /// Glove and gripper are up by then, µs.
 const UP: u64 = 6_000_000;
+/// The glove was calibrated on a flat hand by then, µs.
+const CALIBRATED: u64 = 10_000_000;
 /// The virtual gripper has activated by then, µs.
 const ACTIVE: u64 = 20_000_000;
 
@@ -70,7 +74,15 @@ pub fn record(
 ) -> Recorded {
     let clock = Clock::new();
     let log = Log::default();
-    let glove = VirtualGlove::new(Box::new(hand), rig::glove::Config::at_baud(BAUD));
+    // Flat until the glove is calibrated.
+    let shown = move |time_s: f64| {
+        if time_s < CALIBRATED as f64 * 1e-6 {
+            [0.0; 25]
+        } else {
+            hand(time_s)
+        }
+    };
+    let glove = VirtualGlove::new(Box::new(shown), rig::glove::Config::at_baud(BAUD));
     let gripper = VirtualGripper::new(rig::gripper::Config::default());
     let faults = faults(faulty);
     let tap = |wire: MemoryWire, port: u8| Tap {
@@ -256,6 +268,8 @@ struct Host<'i> {
     offset: usize,
     due: u64,
     activated: bool,
+    calibrated: bool,
+    engaged: bool,
     until: u64,
     released: bool,
 }
@@ -268,6 +282,8 @@ impl<'i> Host<'i> {
             offset: 0,
             due: 0,
             activated: false,
+            calibrated: false,
+            engaged: false,
             until: ACTIVE + seconds * 1_000_000,
             released: false,
         }
@@ -302,13 +318,22 @@ impl<'i> Host<'i> {
         } else if !self.activated && now >= UP {
             self.activated = true;
             self.say(line, Call::Activate);
+        } else if !self.calibrated && now >= UP {
+            self.calibrated = true;
+            self.say(line, Call::CalibrateFlatHand);
         } else if now < ACTIVE {
             // A line that is not clean: what is no frame is counted and passed over.
             line.0.borrow_mut().extend([0x55, 0x00, 0x13]);
             self.say(line, Call::Status);
             self.due = now + 10 * REQUEST_EVERY;
         } else if now < self.until {
-            self.say(line, Call::Engage);
+            let call = if self.engaged {
+                Call::Heartbeat { epoch: FIRST_EPOCH }
+            } else {
+                Call::Engage
+            };
+            self.engaged = true;
+            self.say(line, call);
             self.due = now + BEAT;
         } else {
             let call = if self.released {

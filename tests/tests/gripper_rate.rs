@@ -3,7 +3,7 @@
 //!
 //! The tests run a part of each campaign; `cargo xtask campaign` runs the whole ones (the ignored tests).
 
-use bridge::{App, Config, Instant, Platform, State};
+use bridge::{App, Config, Epoch, Instant, Platform, State};
 use gauntlet::slots::MemorySlot;
 use glove::scan::Scanner;
 use gripper::driver::{self, ThreeFinger};
@@ -90,6 +90,7 @@ struct Bench {
     gripper: VirtualGripper,
     wire: MemoryWire,
     beat: u64,
+    epoch: Option<Epoch>,
 }
 
 impl Bench {
@@ -117,7 +118,10 @@ impl Bench {
             gripper,
             wire,
             beat: 0,
+            epoch: None,
         };
+        // The sensors sit straight.
+        bench.app.set_calibration(glove::hand::Calibration::identity());
         let end = 20_000 * MS;
         while bench.app.telemetry().state != State::Following {
             bench.step();
@@ -133,7 +137,10 @@ impl Bench {
     /// One step of the loop and the wait after it.
     fn step(&mut self) {
         if self.now() >= self.beat {
-            self.app.engage();
+            match self.epoch {
+                None => self.epoch = Some(self.app.engage()),
+                Some(epoch) => assert_eq!(self.app.heartbeat(epoch), Ok(())),
+            }
             self.beat = self.now() + HEARTBEAT;
         }
         let due = self.app.step();

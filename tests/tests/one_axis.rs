@@ -87,13 +87,19 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
             store,
             Config::default(),
         );
+        // The sensors sit straight.
+        app.set_calibration(glove::hand::Calibration::identity());
         let mut beat = 0;
+        let mut epoch = None;
         let mut run = |seconds: u64| {
             let end = clock.now().as_ticks() + seconds * 1_000_000;
             while clock.now().as_ticks() < end {
                 let now = clock.now().as_ticks();
                 if now >= beat {
-                    app.engage();
+                    match epoch {
+                        None => epoch = Some(app.engage()),
+                        Some(epoch) => assert_eq!(app.heartbeat(epoch), Ok(())),
+                    }
                     beat = now + HEARTBEAT;
                 }
                 let due = app.step();

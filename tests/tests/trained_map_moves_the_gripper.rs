@@ -57,13 +57,15 @@ impl Bench {
             gripper,
             gripper_wire,
         } = Devices::new(move |_| pose);
-        let app = App::new(
+        let mut app = App::new(
             Machine(clock.clone()),
             Scanner::new(glove_wire, glove::scan::Config::default()),
             ThreeFinger::new(gripper_wire, gripper::driver::Config::default()),
             bench::store(image),
             Config::default(),
         );
+        // The sensors sit straight.
+        app.set_calibration(glove::hand::Calibration::identity());
         Self {
             app,
             clock,
@@ -77,10 +79,14 @@ impl Bench {
     fn run(&mut self, time: u64, clutch: bool) {
         let end = self.clock.now().as_ticks() + time;
         let mut beat = 0;
+        let mut epoch = None;
         while self.clock.now().as_ticks() < end {
             let now = self.clock.now().as_ticks();
             if clutch && now >= beat {
-                self.app.engage();
+                match epoch {
+                    None => epoch = Some(self.app.engage()),
+                    Some(epoch) => assert_eq!(self.app.heartbeat(epoch), Ok(())),
+                }
                 beat = now + HEARTBEAT;
             }
             let due = self.app.step();

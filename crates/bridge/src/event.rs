@@ -1,5 +1,6 @@
 //! What happened, for a person: typed, with its time, in a bounded queue.
 
+use crate::calibration::Try;
 use crate::{Duration, Instant, State};
 use gripper::registers::Fault;
 
@@ -52,15 +53,15 @@ pub enum Kind {
     },
     /// The gripper's fault changed; [`Fault::None`] when it is gone.
     GripperFault(Fault),
+    /// This axis of the gripper stands although it has been told to move for 1.5 s, and says nothing of an obstacle.
+    AxisStands {
+        /// The axis, from 0.
+        axis: u8,
+    },
     /// The gripper was asked to activate: it moves.
     ActivationRequested,
-    /// A flat hand was taken as calibration.
-    Calibrated,
-    /// No complete frame came for a calibration in time.
-    CalibrationFailed {
-        /// Segments without a good sample (bit k: segment k); all, when no frame came.
-        missing: u16,
-    },
+    /// A try to calibrate ended this way.
+    Calibration(Try),
     /// A weights image is active.
     Weights {
         /// Its slot.
@@ -86,8 +87,6 @@ pub enum Kind {
 pub enum Request {
     /// Activating the gripper while it follows the hand.
     Activate,
-    /// Calibrating.
-    Calibrate,
 }
 
 impl core::fmt::Display for Kind {
@@ -125,16 +124,17 @@ impl core::fmt::Display for Kind {
             }
             Kind::GripperFault(Fault::None) => f.write_str("the gripper's fault is gone"),
             Kind::GripperFault(fault) => write!(f, "gripper {fault}"),
+            Kind::AxisStands { axis } => write!(
+                f,
+                "{} of the gripper stands still although it is told to move",
+                crate::telemetry::axis_name(*axis)
+            ),
             Kind::ActivationRequested => f.write_str("the gripper was asked to activate: it moves"),
-            Kind::Calibrated => f.write_str("calibrated on the flat hand"),
-            Kind::CalibrationFailed { missing } => {
-                f.write_str("not calibrated, no good sample from:")?;
-                for (segment, name) in glove::hand::SEGMENT_NAMES.iter().enumerate() {
-                    if missing & (1 << segment) != 0 {
-                        write!(f, " {name}")?;
-                    }
-                }
-                Ok(())
+            Kind::Calibration(Try::Taken) => f.write_str("calibrated on the flat hand"),
+            Kind::Calibration(Try::Undone) => f.write_str("the newest calibration was taken back"),
+            Kind::Calibration(Try::Refused(why)) => write!(f, "not calibrated: {why}"),
+            Kind::Calibration(Try::None | Try::Waiting) => {
+                f.write_str("calibrating: hold the hand flat and still")
             }
             Kind::Weights {
                 slot,
@@ -153,9 +153,6 @@ impl core::fmt::Display for Kind {
             Kind::Refused(Request::Activate) => f.write_str(
                 "not activated while the gripper follows the hand: release the clutch first",
             ),
-            Kind::Refused(Request::Calibrate) => {
-                f.write_str("not calibrated while the clutch is closed: release it first")
-            }
         }
     }
 }

@@ -6,11 +6,13 @@
 //!
 //! | module | what it knows |
 //! |---|---|
+//! | [`clutch`] | closed by a person, kept closed by heartbeats. Pure |
 //! | [`supervisor`] | what the gripper is told: clutch, freshness, lead, rate, configuration space, holds. Pure |
 //! | [`posture`] | joint angles of a frame, with the joints beside a lost sensor held |
 //! | [`filter`] | One Euro filter, and its lag |
 //! | [`store`] | the weights store: a whole image at any instant of a power cut |
 //! | [`app`] | the loop that ties scanner, map, supervisor, gripper and store; one step never blocks |
+//! | [`calibration`] | whether the glove is calibrated, and how the newest try ended |
 //! | [`config`] | what a person may set, with ranges |
 //! | [`event`], [`telemetry`] | what happened and what is, for whoever looks |
 //! | [`platform`], [`timing`] | the machine underneath; every time the bridge waits for |
@@ -21,6 +23,8 @@
 #![forbid(unsafe_code)]
 
 pub mod app;
+pub mod calibration;
+pub mod clutch;
 pub mod config;
 pub mod event;
 pub mod filter;
@@ -33,6 +37,8 @@ pub mod telemetry;
 pub mod timing;
 
 pub use app::App;
+pub use calibration::CalibrationState;
+pub use clutch::{Clutch, Epoch};
 pub use config::{Config, SafeAction, Settings};
 pub use event::Event;
 pub use platform::{Platform, Slot};

@@ -21,7 +21,7 @@ pub struct Reading {
 #[derive(Debug, Clone)]
 pub struct Posture {
     side: Side,
-    calibration: Calibration,
+    calibration: Option<Calibration>,
     angles: [f32; JOINT_COUNT],
     /// Joints that have been measured since the calibration.
     known: u32,
@@ -31,7 +31,7 @@ pub struct Posture {
 
 impl Posture {
     /// Nothing measured yet.
-    pub fn new(side: Side, calibration: Calibration) -> Self {
+    pub fn new(side: Side, calibration: Option<Calibration>) -> Self {
         Self {
             side,
             calibration,
@@ -41,9 +41,15 @@ impl Posture {
         }
     }
 
-    /// The calibration in use.
-    pub fn calibration(&self) -> &Calibration {
-        &self.calibration
+    /// The calibration in use; without one, angles are those of sensors that sit straight.
+    pub fn calibration(&self) -> Option<&Calibration> {
+        self.calibration.as_ref()
+    }
+
+    /// Whether the calibration is worth something: there is one, and neither the `hand` sensor nor two others have lost their
+    /// heading since.
+    pub fn is_calibrated(&self) -> bool {
+        self.calibration.is_some() && self.distrusted & 1 == 0 && self.distrusted.count_ones() < 2
     }
 
     /// The last good angle of every joint, radians; zero where none was measured.
@@ -52,7 +58,7 @@ impl Posture {
     }
 
     /// Takes another calibration. Angles measured under the old one do not count, and every sensor is trusted again.
-    pub fn calibrate(&mut self, calibration: Calibration) {
+    pub fn calibrate(&mut self, calibration: Option<Calibration>) {
         *self = Self::new(self.side, calibration);
     }
 
@@ -69,9 +75,13 @@ impl Posture {
     /// With one sensor missing (not the `hand`), the joints on both sides of its segment keep their last good angle.
     ///
     /// # Errors
+    /// - `NotCalibrated`: the `hand` sensor or two others have lost their heading since the calibration.
     /// - `SensorsLost`: the `hand` sensor or two others are missing, or one is and a joint beside it was never measured.
     /// - `InputRefused`: an angle is not finite, which checked samples cannot give.
     pub fn read(&mut self, frame: &Frame) -> Result<Reading, HoldReason> {
+        if self.calibration.is_some() && !self.is_calibrated() {
+            return Err(HoldReason::NotCalibrated);
+        }
         let missing = missing(frame) | self.distrusted;
         if missing & 1 != 0 || missing.count_ones() > 1 {
             return Err(HoldReason::SensorsLost(missing));
@@ -85,7 +95,9 @@ impl Posture {
             return Err(HoldReason::SensorsLost(missing));
         }
         let orientations = frame.samples.map(|sample| sample.orientation);
-        let measured = hand::joint_angles(&orientations, &self.calibration, self.side);
+        let straight = Calibration::identity();
+        let calibration = self.calibration.as_ref().unwrap_or(&straight);
+        let measured = hand::joint_angles(&orientations, calibration, self.side);
         let angles = core::array::from_fn(|joint| {
             if held & (1 << joint) != 0 {
                 self.angles[joint]

@@ -1,5 +1,7 @@
 //! What the bridge knows at the end of a step, in one plain struct.
 
+use crate::calibration::CalibrationState;
+use crate::clutch::Position;
 use crate::posture::{self, Reading};
 use crate::{Duration, HoldReason, Instant, State};
 use glove::hand::JOINT_COUNT;
@@ -16,6 +18,10 @@ pub struct Telemetry<const X: usize> {
     pub now: Instant,
     /// State of the supervisor.
     pub state: State,
+    /// Where the clutch is.
+    pub clutch: Position,
+    /// Whether the glove is calibrated, or how the newest try ended.
+    pub calibration: CalibrationState,
     /// Counts frames taken; 0: none yet. Wraps, like the other two.
     pub frame_sequence: u32,
     /// The newest frame.
@@ -80,8 +86,10 @@ pub struct Counters {
     pub steps: u32,
     /// Steps that came more than 2 ms late.
     pub late_steps: u32,
-    /// The latest one, microseconds.
+    /// The latest one, microseconds; a stall counts too.
     pub worst_late_us: u32,
+    /// Of those, stalls: more than 100 ms without a step, after which motion is held and settles anew.
+    pub stalls: u32,
     /// Frames that gave no angles (lost sensors) or were refused by the map.
     pub unusable_frames: u32,
     /// Frames that the gripper was to follow: a command that rests on each of them is due.
@@ -104,6 +112,8 @@ impl<const X: usize> Telemetry<X> {
         Self {
             now,
             state: State::Idle,
+            clutch: Position::Open,
+            calibration: CalibrationState::default(),
             frame_sequence: 0,
             frame: None,
             angles: [0.0; JOINT_COUNT],
@@ -161,6 +171,14 @@ impl<const X: usize> Telemetry<X> {
         }
         self.sent = Some(sent);
     }
+}
+
+/// Names of the 3-Finger gripper's axes; a 2-Finger one's only axis goes by the first word.
+const AXIS_NAMES: [&str; 4] = ["finger A", "finger B", "finger C", "the scissor"];
+
+/// An axis in words.
+pub(crate) fn axis_name(axis: u8) -> &'static str {
+    AXIS_NAMES.get(usize::from(axis)).unwrap_or(&"an axis")
 }
 
 /// Counts one more.

@@ -1,6 +1,6 @@
 //! Every time the bridge waits for, and the sum behind it.
 
-use crate::Duration;
+use crate::{Duration, Instant};
 
 /// Period of the supervisor: one step at least this often.
 ///
@@ -22,8 +22,11 @@ pub const MAX_AGE: Duration = Duration::from_ticks(100_000);
 /// The host sends the clutch's heartbeat this often.
 pub const HEARTBEAT: Duration = Duration::from_ticks(100_000);
 
-/// Without a heartbeat for this long the clutch is open: two may be lost, with half a period to spare.
+/// Without a heartbeat for this long motion is held: two may be lost, with half a period to spare.
 pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_ticks(250_000);
+
+/// Without a heartbeat for this long the clutch has opened by itself: only an act of a person closes it again.
+pub const CLUTCH_EXPIRES: Duration = Duration::from_ticks(1_000_000);
 
 /// Motion that has been held for this long gives way to the configured safe action.
 pub const SAFE_AFTER: Duration = Duration::from_ticks(500_000);
@@ -31,11 +34,25 @@ pub const SAFE_AFTER: Duration = Duration::from_ticks(500_000);
 /// A gripper that is written to for this long and does not report gGTO is not following.
 pub const IGNORED_AFTER: Duration = Duration::from_ticks(500_000);
 
+/// A gripper that echoes one and the same position for this long while it is told others is not following.
+pub const ECHO_AFTER: Duration = Duration::from_ticks(1_000_000);
+
+/// An axis that stands for this long although it is told to move is told of.
+pub const STANDS_AFTER: Duration = Duration::from_ticks(1_500_000);
+
 /// Longest time one step of the loop may take, whatever the devices do.
 pub const STEP_BUDGET: Duration = Duration::from_ticks(1_000);
 
 /// A device that has said nothing for this long is told to be silent. (Motion ended long before, after [`MAX_AGE`].)
 pub const SILENT: Duration = Duration::from_ticks(500_000);
 
-/// A calibration waits this long for a complete frame.
-pub const CALIBRATION_WAIT: Duration = Duration::from_ticks(2_000_000);
+/// Whether what is stamped `stamp` may still be used: at most [`MAX_AGE`] old.
+pub fn is_fresh(now: Instant, stamp: Instant) -> bool {
+    is_within(now, stamp, MAX_AGE)
+}
+
+/// Whether `stamp` lies at most `span` before `now`. One in the future is a fault of a clock: it does not.
+pub fn is_within(now: Instant, stamp: Instant, span: Duration) -> bool {
+    now.checked_duration_since(stamp)
+        .is_some_and(|age| age <= span)
+}

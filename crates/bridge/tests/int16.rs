@@ -71,6 +71,9 @@ fn the_map_output_is_the_stored_map_of_the_angles_within_the_stated_error() {
 fn one_kind_replaces_the_other_in_the_store() {
     let mut bench = bench(hand_image(1));
     assert_eq!(element(&bench), Element::F32);
+    bench
+        .app
+        .set_calibration(glove::hand::Calibration::identity());
     bench.run(S);
     store(&mut bench, &hand_image_int16(2)).expect("a sound image");
     assert_eq!(element(&bench), Element::I16);

@@ -1,216 +1,15 @@
-//! The host protocol: frames, sessions, weights over the line, refusals; the host's end is written here, on postcard, cobs
-//! and a CRC of its own.
+//! The host protocol: frames, sessions, weights over the line, refusals.
 
 mod common;
 
 use bridge::protocol::message::{
-    Answer, CHUNK, Call, Counters, FromBridge, Refusal, Reply, Request, SlotContents, VERSION,
-    WeightsKind,
+    Answer, CHUNK, Call, FromBridge, Refusal, SlotContents, VERSION, WeightsKind,
 };
-use bridge::protocol::{Outcome, Server, frame};
+use bridge::protocol::{Outcome, frame};
 use bridge::{Settings, State, store};
 use common::bench::{Bench, MS, S};
+use common::host::{Host, crc32, framed};
 use common::{hand_image, hand_image_int16};
-use embedded_io::{ErrorType, Read, ReadReady, Write};
-use std::cell::RefCell;
-use std::collections::VecDeque;
-use std::rc::Rc;
-
-/// Both directions of a line between host and bridge, no bytes lost.
-#[derive(Clone, Default)]
-struct Line {
-    to_bridge: Rc<RefCell<VecDeque<u8>>>,
-    to_host: Rc<RefCell<VecDeque<u8>>>,
-}
-
-impl ErrorType for Line {
-    type Error = core::convert::Infallible;
-}
-
-impl ReadReady for Line {
-    fn read_ready(&mut self) -> Result<bool, Self::Error> {
-        Ok(!self.to_bridge.borrow().is_empty())
-    }
-}
-
-impl Read for Line {
-    fn read(&mut self, out: &mut [u8]) -> Result<usize, Self::Error> {
-        let mut bytes = self.to_bridge.borrow_mut();
-        let count = out.len().min(bytes.len());
-        for (place, byte) in out.iter_mut().zip(bytes.drain(..count)) {
-            *place = byte;
-        }
-        Ok(count)
-    }
-}
-
-impl Write for Line {
-    /// Seven bytes at a time: a port that takes frames in pieces.
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> {
-        let count = bytes.len().min(7);
-        self.to_host.borrow_mut().extend(&bytes[..count]);
-        Ok(count)
-    }
-
-    fn flush(&mut self) -> Result<(), Self::Error> {
-        Ok(())
-    }
-}
-
-/// Bitwise CRC-32/ISO-HDLC, independent of the crate the bridge uses.
-fn crc32(bytes: &[u8]) -> u32 {
-    !bytes.iter().fold(!0u32, |crc, &byte| {
-        (0..8).fold(crc ^ u32::from(byte), |crc, _| {
-            if crc & 1 == 1 {
-                (crc >> 1) ^ 0xEDB8_8320
-            } else {
-                crc >> 1
-            }
-        })
-    })
-}
-
-fn framed(message: &[u8]) -> Vec<u8> {
-    let mut body = message.to_vec();
-    body.extend(crc32(message).to_le_bytes());
-    let mut out = vec![0; body.len() + body.len() / 254 + 1];
-    let length = cobs::encode(&body, &mut out);
-    out.truncate(length);
-    out.push(0);
-    out
-}
-
-struct Host {
-    bench: Bench,
-    line: Line,
-    server: Server<Line>,
-    sequence: u16,
-    heard: Vec<u8>,
-    outcome: Outcome,
-}
-
-impl Host {
-    fn new(bench: Bench) -> Self {
-        let line = Line::default();
-        Self {
-            server: Server::new(line.clone()),
-            bench,
-            line,
-            sequence: 0,
-            heard: Vec::new(),
-            outcome: Outcome::Continue,
-        }
-    }
-
-    fn turn(&mut self) {
-        self.bench.step();
-        let now = self.bench.app.telemetry().now;
-        self.outcome = self.server.poll(now, &mut self.bench.app);
-    }
-
-    fn run(&mut self, us: u64) {
-        let end = self.bench.now() + us;
-        while self.bench.now() < end {
-            self.turn();
-        }
-    }
-
-    fn say(&mut self, bytes: &[u8]) {
-        self.line.to_bridge.borrow_mut().extend(bytes);
-    }
-
-    fn hear(&mut self) -> Option<FromBridge> {
-        while let Some(byte) = { self.line.to_host.borrow_mut().pop_front() } {
-            if byte != 0 {
-                self.heard.push(byte);
-                continue;
-            }
-            let mut bytes = core::mem::take(&mut self.heard);
-            let length = cobs::decode_in_place(&mut bytes).expect("COBS");
-            let (message, crc) = bytes[..length].split_last_chunk::<4>().expect("a CRC");
-            assert_eq!(crc32(message), u32::from_le_bytes(*crc));
-            return Some(postcard::from_bytes(message).expect("a message"));
-        }
-        None
-    }
-
-    fn send(&mut self, session: u32, sequence: u16, call: Call<'_>) {
-        let mut buffer = [0; 1024];
-        let request = Request {
-            session,
-            sequence,
-            call,
-        };
-        let message = postcard::to_slice(&request, &mut buffer).expect("room");
-        let frame = framed(message);
-        self.say(&frame);
-    }
-
-    fn reply(&mut self) -> Reply {
-        for _ in 0..20_000 {
-            self.turn();
-            if let Some(FromBridge::Reply(reply)) = self.hear() {
-                return reply;
-            }
-        }
-        panic!("no reply");
-    }
-
-    fn ask_as(&mut self, session: u32, call: Call<'_>) -> Result<Answer, Refusal> {
-        self.sequence += 1;
-        self.send(session, self.sequence, call);
-        let reply = self.reply();
-        assert_eq!((reply.session, reply.sequence), (session, self.sequence));
-        reply.answer
-    }
-
-    fn ask(&mut self, call: Call<'_>) -> Result<Answer, Refusal> {
-        self.ask_as(7, call)
-    }
-
-    fn hello(mut self) -> Self {
-        let answer = self.ask(Call::Hello { version: VERSION });
-        assert!(matches!(answer, Ok(Answer::Hello(_))), "{answer:?}");
-        self
-    }
-
-    fn begin(&mut self, image: &[u8]) -> u32 {
-        let length = image.len() as u32;
-        match self.ask(Call::WeightsBegin {
-            length,
-            crc: crc32(image),
-        }) {
-            Ok(Answer::Received { bytes }) => bytes,
-            other => panic!("{other:?}"),
-        }
-    }
-
-    fn chunks(&mut self, image: &[u8], from: usize, to: usize) {
-        for (index, bytes) in image[from..to].chunks(CHUNK).enumerate() {
-            let offset = (from + index * CHUNK) as u32;
-            let answer = self.ask(Call::WeightsChunk { offset, bytes });
-            assert_eq!(
-                answer,
-                Ok(Answer::Received {
-                    bytes: offset + bytes.len() as u32
-                })
-            );
-        }
-    }
-
-    fn flash(&mut self, image: &[u8]) -> Result<Answer, Refusal> {
-        assert_eq!(self.begin(image), 0);
-        self.chunks(image, 0, image.len());
-        self.ask(Call::WeightsCommit)
-    }
-
-    fn counters(&mut self) -> Counters {
-        match self.ask(Call::Counters) {
-            Ok(Answer::Counters(counters)) => counters,
-            other => panic!("{other:?}"),
-        }
-    }
-}
 
 fn without_weights() -> Host {
     Host::new(Bench::with(
@@ -236,13 +35,13 @@ fn following() -> Host {
 fn hello_and_status_have_the_bytes_that_the_protocol_document_prints() {
     let mut host = without_weights();
     host.say(&[0x08, 0x07, 0x01, 0x00]); // noise, then a zero ends it
-    host.say(&framed(&[0x07, 0x01, 0x00, 0x02]));
+    host.say(&framed(&[0x07, 0x01, 0x00, 0x03]));
     let reply = host.reply();
     assert_eq!((reply.session, reply.sequence), (7, 1));
     let Ok(Answer::Hello(hello)) = reply.answer else {
         panic!("{reply:?}")
     };
-    assert_eq!(hello.version, 2);
+    assert_eq!(hello.version, 3);
     assert_eq!(hello.shape, [25, 300, 4]);
     assert_eq!(hello.joint_order, 1);
     host.say(&framed(&[0x07, 0x02, 0x01]));
@@ -254,7 +53,7 @@ fn another_version_and_requests_before_hello_are_refused() {
     let mut host = without_weights();
     assert_eq!(host.ask(Call::Status), Err(Refusal::NoSession));
     let answer = host.ask(Call::Hello { version: 1 });
-    assert_eq!(answer, Err(Refusal::Version { bridge: 2 }));
+    assert_eq!(answer, Err(Refusal::Version { bridge: 3 }));
     assert_eq!(host.ask(Call::Engage), Err(Refusal::NoSession));
     assert!(!host.bench.app.is_engaged());
 }
@@ -410,7 +209,6 @@ fn a_second_host_is_refused_while_the_first_holds_the_clutch_and_taken_when_it_v
     let mut host = following();
     let busy = host.ask_as(8, Call::Hello { version: VERSION });
     assert_eq!(busy, Err(Refusal::Busy { session: 7 }));
-    assert_eq!(host.ask_as(8, Call::Release), Err(Refusal::NoSession));
     host.run(4 * S);
     assert!(host.ask_as(8, Call::Hello { version: VERSION }).is_ok());
     assert_eq!(host.ask_as(7, Call::Engage), Err(Refusal::NoSession));
@@ -509,7 +307,7 @@ fn garbage_between_requests_is_counted_and_the_next_request_is_answered() {
 
 #[test]
 fn every_single_bit_error_in_a_request_is_refused_by_the_frame() {
-    let frame = framed(&[0x07, 0x01, 0x00, 0x02]);
+    let frame = framed(&[0x07, 0x01, 0x00, 0x03]);
     for bit in 0..frame.len() * 8 {
         let mut host = without_weights();
         let mut damaged = frame.clone();

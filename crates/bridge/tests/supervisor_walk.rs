@@ -2,7 +2,7 @@
 //! stall, jump and run backwards. After every step an independent checker looks at the rules.
 
 use bridge::supervisor::{Hand, Inputs, Output, Supervisor, Weights};
-use bridge::{Config, HoldReason, Instant, SafeAction, Settings, State};
+use bridge::{Clutch, Config, HoldReason, Instant, SafeAction, Settings, State};
 use gripper::registers::Fault;
 use gripper::{Activation, Contact, Motion, Status};
 use rand::{Rng, SeedableRng};
@@ -49,12 +49,20 @@ struct World {
     activation: Activation,
     fault: Fault,
     going_to: bool,
+    /// Counts in 10 ms.
     speed: f32,
+    /// Somebody pushes this axis there.
+    pushed: Option<(usize, f32)>,
     clutch: bool,
     glove: bool,
     gripper: bool,
     wanted: [f32; 4],
     inputs: Inputs<4>,
+}
+
+/// A clutch whose newest heartbeat came at `beat`.
+fn closed(beat: Instant) -> Clutch {
+    Clutch::Closed { epoch: 0, beat }
 }
 
 fn at(us: u64) -> Instant {
@@ -74,13 +82,14 @@ impl World {
             activation: Activation::Ready,
             fault: Fault::None,
             going_to: false,
-            speed: 2.0,
+            speed: 1.8,
+            pushed: None,
             clutch: false,
             glove: true,
             gripper: true,
             wanted: [100.0; 4],
             inputs: Inputs {
-                heartbeat: None,
+                clutch: Clutch::Open,
                 hand: None,
                 status: None,
                 weights: Weights::Ready,
@@ -89,8 +98,9 @@ impl World {
     }
 
     fn turn(&mut self) {
+        let before = self.now;
         self.clock();
-        self.plant();
+        self.plant(self.now.saturating_sub(before));
         self.person();
         self.frames();
         self.statuses();
@@ -112,17 +122,19 @@ impl World {
         };
     }
 
-    fn plant(&mut self) {
+    fn plant(&mut self, us: u64) {
+        let way = |speed: f32| speed * us as f32 * 1e-4;
         for axis in 0..4 {
             let goal = f32::from(self.echo[axis]);
             let free = !matches!(
                 self.contact[axis],
                 Contact::ContactOpening | Contact::ContactClosing
             );
-            if free && self.going_to && self.activation == Activation::Ready {
+            let pushed = self.pushed.is_some_and(|(pushed, _)| pushed == axis);
+            if free && !pushed && self.going_to && self.activation == Activation::Ready {
                 self.position[axis] = goal.clamp(
-                    self.position[axis] - self.speed,
-                    self.position[axis] + self.speed,
+                    self.position[axis] - way(self.speed),
+                    self.position[axis] + way(self.speed),
                 );
             }
             if self.dice.permille(3) {
@@ -133,13 +145,18 @@ impl World {
                     _ => Contact::AtPosition,
                 };
             }
-            // Somebody pushes a finger.
+            // Somebody pushes a finger, no faster than it could move.
             if self.dice.permille(1) {
-                self.position[axis] = f32::from(self.dice.byte());
+                self.pushed = Some((axis, f32::from(self.dice.byte())));
             }
         }
+        if let Some((axis, goal)) = self.pushed {
+            let here = self.position[axis];
+            self.position[axis] = goal.clamp(here - way(1.8), here + way(1.8));
+            self.pushed = self.pushed.filter(|_| self.position[axis] != goal);
+        }
         if self.dice.permille(5) {
-            self.speed = self.dice.below(60) as f32 / 10.0;
+            self.speed = self.dice.below(19) as f32 / 10.0;
         }
         // Another program set a far position once.
         if self.dice.permille(1) {
@@ -152,11 +169,11 @@ impl World {
         if self.dice.permille(toggle) {
             self.clutch = !self.clutch;
             if !self.clutch && self.dice.permille(500) {
-                self.inputs.heartbeat = None;
+                self.inputs.clutch = Clutch::Open;
             }
         }
         if self.clutch {
-            self.inputs.heartbeat = Some(at(if self.dice.permille(2) {
+            self.inputs.clutch = closed(at(if self.dice.permille(2) {
                 self.now + self.dice.below(1_000_000)
             } else {
                 self.now - self.dice.below(80_000).min(self.now)
@@ -284,11 +301,10 @@ impl Checker {
         }
         let moving = output.state.is_moving();
         if moving {
-            let beat = world
-                .inputs
-                .heartbeat
-                .expect("no motion without the clutch")
-                .as_ticks();
+            let Clutch::Closed { beat, .. } = world.inputs.clutch else {
+                panic!("no motion without the clutch");
+            };
+            let beat = beat.as_ticks();
             assert!(
                 world.now >= beat && world.now - beat < 250_000,
                 "heartbeat {beat}"
@@ -316,8 +332,12 @@ impl Checker {
             (self.settings.speed, self.settings.force)
         );
         assert_eq!(status.activation, Activation::Ready);
+        // A second step at the very instant of the first repeats it.
+        let again = self.before.is_some_and(|(then, before, _)| {
+            then == world.now && !before.before.is_moving() && before.motion == Some(motion)
+        });
         match output.state {
-            State::Blending | State::Following if output.before.is_moving() => {
+            State::Blending | State::Following if output.before.is_moving() && !again => {
                 self.moves += 1;
                 self.led(&motion, &status);
                 self.inside(&motion, &status);

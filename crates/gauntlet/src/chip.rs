@@ -1,20 +1,26 @@
 //! A bridge on a chip as a person watches it: heartbeat, telemetry, live view, and the counters' difference at the end.
 
-use std::io::Write;
+mod stop;
+mod table;
+
+use stop::stop;
+pub use table::{write_head, write_row};
+
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::State;
 use bridge::protocol::message::{Counters, Sample, Status};
+use bridge::{Epoch, State};
 use gripper::{Activation, Fault};
 use serde::Serialize;
 
 use crate::failure::{Failure, OrFail};
-use crate::host_link::{Error, HostLink};
+use crate::host_link::{Error, Heartbeat, HostLink};
 use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
-use crate::run::End;
+use crate::run::{End, clutch_expired};
 use crate::stats::{Percentiles, Rate, short_or_dash};
+use crate::stopped::Stopped;
 use crate::words;
 
 /// Pause between two heartbeats, spent listening.
@@ -111,12 +117,43 @@ impl Summary {
     }
 }
 
+/// What is left when a watch is over.
+#[derive(Debug)]
+pub struct Watched {
+    /// Its numbers.
+    pub summary: Summary,
+    /// Why it ended.
+    pub end: End,
+    /// How the gripper was left, where the clutch was closed.
+    pub stopped: Option<Stopped>,
+    /// The clutch opened by itself, and nobody closed it again.
+    pub expired: bool,
+}
+
+impl Watched {
+    /// The failure that a run is which nobody attended: its clutch opened by itself.
+    ///
+    /// # Errors
+    /// That one.
+    pub fn attended(&self) -> Result<()> {
+        if !self.expired {
+            return Ok(());
+        }
+        Err(clutch_expired().into())
+    }
+}
+
 /// A bridge that somebody watches.
 #[derive(Debug)]
 pub struct Watch<'a> {
     link: &'a mut HostLink,
     interrupt: &'a Interrupt,
-    clutch: bool,
+    /// Of the closing that is kept.
+    epoch: Option<Epoch>,
+    /// The clutch was closed by this watch.
+    engaged: bool,
+    /// It opened by itself, and was not closed again.
+    expired: bool,
     missed: u32,
     status: Option<Status>,
     sample: Option<Sample>,
@@ -137,7 +174,9 @@ impl<'a> Watch<'a> {
         Self {
             link,
             interrupt,
-            clutch: false,
+            epoch: None,
+            engaged: false,
+            expired: false,
             missed: 0,
             status: None,
             sample: None,
@@ -153,32 +192,35 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Watches until the time is over or somebody asks for the end, then opens the clutch. `each` is given every sample.
+    /// Watches until the time is over or somebody asks for the end, then opens the clutch and sees how the gripper was left.
+    /// `each` is given every sample.
     ///
     /// # Errors
-    /// What ended the line, the bridge's refusal, the terminal's or the file's fault.
+    /// Where the gripper may still move; what ended the line, the bridge's refusal, the terminal's or the file's fault.
     pub fn run(
         mut self,
         options: &Options,
         each: &mut dyn FnMut(&Sample) -> std::io::Result<()>,
-    ) -> Result<(Summary, End)> {
+    ) -> Result<Watched> {
         let before = self.link.counters().map_err(Failure::from)?;
         self.link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
         self.started = Instant::now();
-        self.clutch = options.engage;
         let watched = self.watch(options, each);
-        // Also after a fault: the clutch must not stay closed for its last quarter of a second.
-        if self.clutch {
-            let released = self.link.release();
-            if watched.is_ok() {
-                released.map_err(Failure::from)?;
-            }
+        let seconds = self.started.elapsed().as_secs_f64();
+        let stopped = self.engaged.then(|| stop(self.link));
+        // Whether the gripper may still move comes before whatever else went wrong.
+        if let Some(stopped) = &stopped {
+            stopped.judge()?;
         }
         let end = watched?;
-        let seconds = self.started.elapsed().as_secs_f64();
         self.link.telemetry(0).map_err(Failure::from)?;
         let after = self.link.counters().map_err(Failure::from)?;
-        Ok((self.summary(seconds, &before, &after), end))
+        Ok(Watched {
+            summary: self.summary(seconds, &before, &after),
+            end,
+            stopped,
+            expired: self.expired,
+        })
     }
 
     fn watch(
@@ -189,16 +231,19 @@ impl<'a> Watch<'a> {
         let terminal = || "the terminal does not work".to_owned();
         let next = "`gauntlet … | cat`, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
+        if options.engage {
+            self.engage()?;
+        }
         let mut asked_status: Option<Instant> = None;
         loop {
             let beat = Instant::now();
-            if self.clutch {
-                self.heartbeat()?;
+            if let Some(epoch) = self.epoch {
+                self.heartbeat(epoch)?;
             } else if asked_status.is_none_or(|at| at.elapsed() >= STATUS_EVERY) {
                 asked_status = Some(beat);
                 self.status = Some(self.link.status().map_err(Failure::from)?);
             }
-            self.count()?;
+            self.count(beat + HEARTBEAT)?;
             let rest = HEARTBEAT.saturating_sub(beat.elapsed());
             for sample in self.link.listen(rest).map_err(Failure::from)? {
                 each(&sample).or_fail(
@@ -223,13 +268,23 @@ impl<'a> Watch<'a> {
         }
     }
 
-    fn heartbeat(&mut self) -> Result<()> {
-        match self.link.engage().map_err(Failure::from)? {
-            Some(status) => {
+    /// Closes the clutch: an act of a person.
+    fn engage(&mut self) -> Result<()> {
+        let (epoch, status) = self.link.engage().map_err(Failure::from)?;
+        self.epoch = Some(epoch);
+        self.status = Some(status);
+        (self.engaged, self.expired, self.missed) = (true, false, 0);
+        Ok(())
+    }
+
+    fn heartbeat(&mut self, epoch: Epoch) -> Result<()> {
+        match self.link.heartbeat(epoch).map_err(Failure::from)? {
+            Heartbeat::Kept(status) => {
                 self.missed = 0;
                 self.status = Some(status);
             }
-            None => self.missed += 1,
+            Heartbeat::Refused => (self.epoch, self.expired) = (None, true),
+            Heartbeat::Unanswered => self.missed += 1,
         }
         if self.missed >= MISSED_BEATS {
             return Err(Failure::from(Error::Silent {
@@ -242,14 +297,16 @@ impl<'a> Watch<'a> {
         Ok(())
     }
 
-    /// Once a second: the gripper's rate, from the bridge's own count.
-    fn count(&mut self) -> Result<()> {
+    /// Once a second, where the answer comes by `end`: the gripper's rate, from the bridge's own count.
+    fn count(&mut self, end: Instant) -> Result<()> {
         let now = Instant::now();
         match self.counted {
             Some((at, _)) if now.duration_since(at) < COUNT_EVERY => return Ok(()),
             _ => {}
         }
-        let counters = self.link.counters().map_err(Failure::from)?;
+        let Some(counters) = self.link.counters_by(end).map_err(Failure::from)? else {
+            return Ok(());
+        };
         if let Some((at, before)) = self.counted.replace((now, counters)) {
             let cycles = counters.statuses.wrapping_sub(before.statuses);
             self.cycles_per_s = f64::from(cycles) / now.duration_since(at).as_secs_f64();
@@ -260,13 +317,16 @@ impl<'a> Watch<'a> {
     fn obey(&mut self, key: Key, options: &Options) -> Result<()> {
         match key {
             Key::End => self.interrupt.ask(),
-            Key::Clutch if options.engage => {
-                self.clutch = !self.clutch;
-                if !self.clutch {
-                    self.status = Some(self.link.release().map_err(Failure::from)?);
-                }
+            Key::Clutch if options.engage && self.epoch.is_some() => {
+                self.epoch = None;
+                self.status = Some(self.link.release().map_err(Failure::from)?);
             }
-            Key::Clutch | Key::Calibrate => {}
+            Key::Clutch if options.engage => self.engage()?,
+            Key::Open if self.epoch.is_some() => {
+                self.epoch = None;
+                self.status = Some(self.link.release().map_err(Failure::from)?);
+            }
+            Key::Clutch | Key::Open | Key::Calibrate => {}
         }
         Ok(())
     }
@@ -338,7 +398,9 @@ impl<'a> Watch<'a> {
             state: state.as_ref().map_or("starting", State::name).to_owned(),
             following: state.is_some_and(|state| state.is_moving()),
             fingers: self.sample.as_ref().map(fingers).unwrap_or_default(),
+            hand_age: None,
             axes: self.sample.as_ref().map(axes).unwrap_or_default(),
+            gripper_age: None,
             frames_per_s: self.frames.now(now_us),
             cycles_per_s: self.cycles_per_s,
             latency_p50: self.latency.at(0.5),
@@ -363,6 +425,9 @@ impl<'a> Watch<'a> {
             }
             _ => Vec::new(),
         };
+        if self.expired {
+            faults.push("the clutch opened by itself: space closes it again".to_owned());
+        }
         if let Some(status) = &self.status {
             faults.extend(standing_faults(status));
         }
@@ -423,28 +488,4 @@ fn axes(sample: &Sample) -> Vec<Axis> {
             word: "",
         })
         .collect()
-}
-
-/// Head of [`write_row`]'s rows, that of a poses file.
-///
-/// # Errors
-/// The file's fault.
-pub fn write_head(out: &mut impl Write) -> std::io::Result<()> {
-    write!(out, "time_s")?;
-    for name in glove::hand::JOINT_NAMES {
-        write!(out, ",{name}")?;
-    }
-    writeln!(out)
-}
-
-/// One sample as a row of a poses file: the bridge's time and the 25 joint angles.
-///
-/// # Errors
-/// The file's fault.
-pub fn write_row(out: &mut impl Write, sample: &Sample) -> std::io::Result<()> {
-    write!(out, "{:.6}", sample.now_us as f64 / 1e6)?;
-    for angle in sample.angles {
-        write!(out, ",{angle}")?;
-    }
-    writeln!(out)
 }

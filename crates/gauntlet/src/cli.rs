@@ -232,7 +232,7 @@ pub struct Teleop {
     /// Which hand wears the glove.
     #[arg(long, value_enum, default_value_t = Hand::Right)]
     pub hand: Hand,
-    /// Take the hand's first pose as flat and fingers together, to calibrate the sensors' seats.
+    /// Calibrate on the flat hand before the clutch may close: waits up to 30 s until it lies still for a second.
     #[arg(long)]
     pub calibrate_flat: bool,
     /// How the gripper's line differs from that of a gripper as delivered.
@@ -281,6 +281,7 @@ pub struct Flash {
 #[command(after_help = "\
 Examples:
   gauntlet bridge status --bridge /dev/ttyUSB0
+  gauntlet bridge calibrate --bridge /dev/ttyUSB0
   gauntlet bridge engage --bridge /dev/ttyUSB0 --activate --seconds 30
   gauntlet bridge monitor --bridge unix:/tmp/gauntlet/host.sock
   gauntlet bridge log --bridge /dev/ttyUSB0 --out my_hand.csv --seconds 30
@@ -307,12 +308,24 @@ pub enum BridgeVerb {
         /// Where it is.
         #[command(flatten)]
         at: BridgeAt,
+        /// Calibrate on the flat hand before: waits up to 30 s until it lies still for a second.
+        #[arg(long)]
+        calibrate_flat: bool,
         /// Activate the gripper if it is not: the fingers move.
         #[arg(long)]
         activate: bool,
         /// End by itself after this many seconds (1 to 86400).
         #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
+    },
+    /// Take the hand, flat and still for a second, as all joints at zero: a glove that is not calibrated does not drive.
+    Calibrate {
+        /// Where it is.
+        #[command(flatten)]
+        at: BridgeAt,
+        /// Take the newest calibration back instead.
+        #[arg(long)]
+        undo: bool,
     },
     /// Open the clutch: end the hold that a vanished host has left; the gripper stays where it is.
     Release {

@@ -1,10 +1,12 @@
 //! The bridge's firmware in QEMU (`mps2-an386`): UART 0 is a socket for the host protocol, UART 1 and 2 are serial
 //! devices of this machine, the weights flash is a file that outlives the machine's power.
 //!
-//! Sockets and files lie in a folder that only this user may enter. The emulator is killed when its handle is dropped.
+//! Sockets and files lie in a folder that only this user may enter. The emulator is killed when its handle is dropped, and
+//! by nothing before: it is in a process group of its own, which Ctrl-C at the terminal does not reach.
 
 use std::ffi::OsString;
 use std::fs::File;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -144,7 +146,9 @@ impl Emulator {
         qemu.args(self.arguments())
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(words);
+            .stderr(words)
+            // Ctrl-C is for this program: it holds the gripper first, which the emulated bridge must live to do.
+            .process_group(0);
         // A chip does not wait for other programs: where the system grants it, neither does the emulator.
         let child = realtime::starting(|| qemu.spawn())
             .and_then(|(child, _)| child)

@@ -1,36 +1,87 @@
 //! Ctrl-C and its relatives: a flag to look at, and a descriptor that wakes a poll.
 //!
 //! A signal only asks for an orderly end: gripper held, log finished, terminal restored. Every part of that end has a
-//! deadline, so that no second, impatient way out is needed.
+//! deadline, so that no second, impatient way out is needed. Every signal that can be caught and would end the program
+//! is one of them; none may end it in motion, without a hold.
 
+use std::ffi::c_int;
+use std::ops::RangeInclusive;
 use std::os::fd::{AsFd, BorrowedFd};
 use std::os::unix::net::UnixStream;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
-use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::consts::{
+    SIGABRT, SIGALRM, SIGHUP, SIGINT, SIGPROF, SIGQUIT, SIGSYS, SIGTERM, SIGTRAP, SIGTSTP, SIGUSR1,
+    SIGUSR2, SIGVTALRM, SIGXCPU, SIGXFSZ,
+};
+use signal_hook::flag;
+use signal_hook::low_level::{emulate_default_handler, pipe, unregister};
+
+/// Signals that people and systems end a program with.
+const ENDS: [c_int; 4] = [SIGHUP, SIGINT, SIGQUIT, SIGTERM];
+/// What else would end it. SIGPIPE is not here: it is ignored, and the failed write is looked at.
+const ENDS_TOO: [c_int; 9] = [
+    SIGABRT, SIGTRAP, SIGSYS, SIGUSR1, SIGUSR2, SIGALRM, SIGVTALRM, SIGPROF, SIGXCPU,
+];
+/// What Linux has besides: SIGSTKFLT, SIGIO, SIGPWR, and the real-time signals; the C library refuses those it uses.
+#[cfg(target_os = "linux")]
+const ENDS_ON_LINUX: [RangeInclusive<c_int>; 3] = [16..=16, 29..=30, 34..=64];
+#[cfg(not(target_os = "linux"))]
+const ENDS_ON_LINUX: [RangeInclusive<c_int>; 0] = [];
+
+/// The handle that signals reach, once one is installed.
+static INSTALLED: OnceLock<Interrupt> = OnceLock::new();
+
+/// Whether a signal or a key asked this process for its end.
+pub fn process_was_asked() -> bool {
+    INSTALLED.get().is_some_and(Interrupt::asked)
+}
 
 /// A handle on "a person asked for the end". Clones share the flag.
 #[derive(Clone, Debug)]
 pub struct Interrupt {
-    asked: Arc<AtomicBool>,
+    flags: Arc<Flags>,
     wake: Arc<UnixStream>,
     _write: Arc<UnixStream>,
 }
 
+#[derive(Debug, Default)]
+struct Flags {
+    asked: Arc<AtomicBool>,
+    /// A file grew to the limit (SIGXFSZ): the write failed, too.
+    file_limit: Arc<AtomicBool>,
+    /// Whoever writes the file tells that; it is no request for the end.
+    file_limit_is_told: AtomicBool,
+    /// Ctrl-Z.
+    suspend: Arc<AtomicBool>,
+}
+
 impl Interrupt {
-    /// Catches SIGINT, SIGTERM and SIGHUP from here on.
+    /// Catches every signal that asks for the end from here on.
     ///
     /// # Errors
     /// The system's error where the handlers cannot be installed.
     pub fn install() -> std::io::Result<Self> {
         let interrupt = Self::never()?;
-        for signal in [SIGINT, SIGTERM, SIGHUP] {
-            signal_hook::flag::register(signal, Arc::clone(&interrupt.asked))?;
-            signal_hook::low_level::pipe::register(signal, interrupt._write.try_clone()?)?;
+        for signal in ENDS {
+            // `nohup`: the program is to outlive its terminal.
+            if signal != SIGHUP || !ignored(SIGHUP) {
+                pipe::register(signal, interrupt._write.try_clone()?)?;
+                flag::register(signal, Arc::clone(&interrupt.flags.asked))?;
+            }
         }
+        // These wake nobody: whoever waits looks at the flag every 50 ms.
+        for signal in ENDS_TOO {
+            flag::register(signal, Arc::clone(&interrupt.flags.asked))?;
+        }
+        for signal in ENDS_ON_LINUX.into_iter().flatten() {
+            let _ = flag::register(signal, Arc::clone(&interrupt.flags.asked));
+        }
+        flag::register(SIGXFSZ, Arc::clone(&interrupt.flags.file_limit))?;
+        let _ = INSTALLED.set(interrupt.clone());
         Ok(interrupt)
     }
 
@@ -41,7 +92,7 @@ impl Interrupt {
     pub fn never() -> std::io::Result<Self> {
         let (wake, write) = UnixStream::pair()?;
         Ok(Self {
-            asked: Arc::new(AtomicBool::new(false)),
+            flags: Arc::default(),
             wake: Arc::new(wake),
             _write: Arc::new(write),
         })
@@ -49,12 +100,35 @@ impl Interrupt {
 
     /// Whether the end was asked for.
     pub fn asked(&self) -> bool {
-        self.asked.load(Ordering::Relaxed)
+        let flags = &*self.flags;
+        flags.asked.load(Ordering::Relaxed)
+            || (flags.file_limit.load(Ordering::Relaxed)
+                && !flags.file_limit_is_told.load(Ordering::Relaxed))
     }
 
     /// Asks for the end as Ctrl-C does (the key `q` in the live view, say).
     pub fn ask(&self) {
-        self.asked.store(true, Ordering::Relaxed);
+        self.flags.asked.store(true, Ordering::Relaxed);
+    }
+
+    /// From here on SIGXFSZ is no request for the end by itself: the caller looks with [`Interrupt::file_limit`].
+    pub fn look_after_file_limit(&self) {
+        self.flags.file_limit_is_told.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether SIGXFSZ came since the last call.
+    pub fn file_limit(&self) -> bool {
+        self.flags.file_limit.swap(false, Ordering::Relaxed)
+    }
+
+    /// Catches Ctrl-Z (SIGTSTP) for as long as what is returned lives.
+    ///
+    /// # Errors
+    /// The system's error where the handler cannot be installed.
+    pub fn catch_suspend(&self) -> std::io::Result<Suspend> {
+        let asked = Arc::clone(&self.flags.suspend);
+        let id = flag::register(SIGTSTP, Arc::clone(&asked))?;
+        Ok(Suspend { asked, id })
     }
 
     /// Sleeps for `time`, or until the end is asked for. Returns whether it was.
@@ -83,6 +157,44 @@ impl AsFd for Interrupt {
     fn as_fd(&self) -> BorrowedFd<'_> {
         self.wake.as_fd()
     }
+}
+
+/// Ctrl-Z while something moves: a request to hold first, and to stop then.
+#[derive(Debug)]
+pub struct Suspend {
+    asked: Arc<AtomicBool>,
+    id: signal_hook::SigId,
+}
+
+impl Suspend {
+    /// Whether Ctrl-Z came since the last call.
+    pub fn asked(&self) -> bool {
+        self.asked.swap(false, Ordering::Relaxed)
+    }
+
+    /// Stops this process as Ctrl-Z does by itself. Returns when it goes on.
+    ///
+    /// # Errors
+    /// The system's error where it does not stop.
+    pub fn stop(&self) -> std::io::Result<()> {
+        emulate_default_handler(SIGTSTP)
+    }
+}
+
+impl Drop for Suspend {
+    fn drop(&mut self) {
+        unregister(self.id);
+    }
+}
+
+/// Whether whoever started this program had `signal` ignored. Known on Linux; elsewhere no.
+fn ignored(signal: c_int) -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    status
+        .lines()
+        .find_map(|line| line.strip_prefix("SigIgn:"))
+        .and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok())
+        .is_some_and(|mask| mask >> (signal - 1) & 1 == 1)
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@
 //! | [`port`], [`ports`], [`probe`] | serial ports: open, list, is anybody there |
 //! | [`mod@line`], [`tcp`] | a gripper's line: a serial port or Modbus TCP |
 //! | [`diagnose`] | which layer of a device fails |
-//! | [`platform`], [`realtime`], [`slots`], [`session`] | the bridge on a PC: clock and wait, priority, weights, thread and queues |
+//! | [`platform`], [`realtime`], [`slots`], [`session`], [`stopped`] | the bridge on a PC: clock and wait, priority, weights, thread and queues; how a session left the gripper |
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
 //! | [`host_link`], [`chip`], [`emulator`] | a bridge on a chip: the host protocol, watching it, the firmware in QEMU |
@@ -41,6 +41,7 @@ pub mod session;
 pub mod session_log;
 pub mod slots;
 pub mod stats;
+pub mod stopped;
 pub mod tcp;
 pub mod tell;
 pub mod training;

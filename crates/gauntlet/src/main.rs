@@ -7,12 +7,17 @@ use gauntlet::cli::Cli;
 use gauntlet::{commands, failure, note, out};
 
 fn main() -> ExitCode {
-    match commands::run(Cli::parse()).and_then(|()| out::check()) {
-        Ok(()) => ExitCode::from(failure::EXIT_DONE),
+    let done = commands::run(Cli::parse());
+    // What was printed before a failure is waited for, too.
+    let printed = out::check();
+    let code = match done.and(printed) {
+        Ok(()) => failure::EXIT_DONE,
         Err(error) => {
             let (text, code) = failure::report(&error);
             note!("{text}");
-            ExitCode::from(code)
+            code
         }
-    }
+    };
+    out::finish();
+    ExitCode::from(code)
 }

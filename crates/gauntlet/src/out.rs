@@ -1,54 +1,135 @@
-//! Printing that outlives its reader: `gauntlet … | head` ends quietly, not in a panic.
+//! Printing that never holds up the program, and outlives its reader: `gauntlet … | head` ends quietly, not in a panic.
+//!
+//! Each stream has a queue and a thread that writes it ([`stream`]). A terminal that takes nothing (its reader stands, a
+//! full pipe) stops that thread alone: whoever drives a gripper goes on, and sees through [`unseen`] that nobody sees.
+
+mod stream;
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
-use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 
 use anyhow::Result;
 
 use crate::failure::Failure;
+use crate::interrupt;
+use stream::{STDERR, STDOUT};
 
-/// The first error of standard output, of this process.
-static FAULT: OnceLock<std::io::Error> = OnceLock::new();
+/// What one stream may wait for the other, so that lines keep their order on a terminal that shows both.
+const SETTLE: Duration = Duration::from_millis(50);
+/// At the end of a run or after Ctrl-C: a stream that took nothing for so long is given up.
+const GIVE_UP: Duration = Duration::from_secs(2);
+/// Pause between two looks at whether somebody asked for the end.
+const LOOK: Duration = Duration::from_millis(50);
+
+/// Whether this process drove something: then its end does not wait for ever for a reader.
+static DROVE: AtomicBool = AtomicBool::new(false);
 
 /// One line to standard output. What goes wrong is kept for [`closed`] and [`check`].
 pub fn line(text: Arguments<'_>) {
-    let mut stdout = std::io::stdout().lock();
-    if let Err(error) = writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
-        // Only the first counts.
-        let _ = FAULT.set(error);
-    }
+    STDERR.settle(SETTLE);
+    STDOUT.push(format!("{text}\n").as_bytes());
 }
 
 /// Whether standard output takes nothing any more: its reader left, or its disk is full.
 pub fn closed() -> bool {
-    FAULT.get().is_some()
+    STDOUT.fault().is_some()
 }
 
-/// Whether everything was printed. A reader that left had enough: no error.
+/// How long standard output has not taken what waits for it; zero where nothing waits.
+pub fn unseen() -> Duration {
+    STDOUT.stalled().unwrap_or_default()
+}
+
+/// Whether something still waits for standard output: what is newer had better wait, too.
+pub fn pending() -> bool {
+    STDOUT.stalled().is_some()
+}
+
+/// Waits until standard output took everything, for `time` at most.
+pub fn settle(time: Duration) {
+    STDOUT.settle(time);
+}
+
+/// This process drives something: from here on its end waits for no reader longer than two seconds.
+pub fn hurry() {
+    DROVE.store(true, Ordering::Relaxed);
+}
+
+/// Waits until everything was printed, and says whether it was. A reader that left had enough: no error.
 ///
 /// # Errors
 /// A failure where the system took a line for another reason not.
 pub fn check() -> Result<()> {
-    match FAULT.get() {
-        Some(error) if error.kind() != ErrorKind::BrokenPipe => Err(Failure::new(
-            format!("standard output took not all of the result: {error}"),
-            "a place with room",
+    let whole = drain(&STDOUT);
+    let next = "a place with room";
+    match STDOUT.fault() {
+        Some((kind, _)) if kind == ErrorKind::BrokenPipe => Ok(()),
+        // The terminal was closed: nobody is there to be told.
+        Some((_, Some(code))) if code == rustix::io::Errno::IO.raw_os_error() => Ok(()),
+        Some((kind, code)) => {
+            let error = code.map_or_else(|| kind.into(), std::io::Error::from_raw_os_error);
+            let what = format!("standard output took not all of the result: {error}");
+            Err(Failure::new(what, next).into())
+        }
+        None if !whole => Err(Failure::new(
+            format!(
+                "standard output took not all of the result: nothing for {} s",
+                GIVE_UP.as_secs()
+            ),
+            "a terminal or a program that reads it",
         )
         .into()),
-        _ => Ok(()),
+        None => Ok(()),
+    }
+}
+
+/// Waits until standard error took everything; no longer than it is worth.
+pub fn finish() {
+    drain(&STDERR);
+}
+
+/// Whether all was taken. Given up where nothing moves for [`GIVE_UP`], and either something was driven or somebody asked
+/// for the end; a result for a pager waits as long as its reader reads.
+fn drain(stream: &'static stream::Stream) -> bool {
+    loop {
+        if stream.settle(LOOK) {
+            return true;
+        }
+        let impatient = DROVE.load(Ordering::Relaxed) || interrupt::process_was_asked();
+        if impatient && stream.stalled().is_some_and(|time| time >= GIVE_UP) {
+            return false;
+        }
     }
 }
 
 /// One line to standard error.
 pub fn note(text: Arguments<'_>) {
-    let _ = writeln!(std::io::stderr().lock(), "{text}");
+    STDOUT.settle(SETTLE);
+    STDERR.push(format!("{text}\n").as_bytes());
 }
 
 /// A question to standard error, the cursor left behind it.
 pub fn ask(text: Arguments<'_>) {
-    let mut stderr = std::io::stderr().lock();
-    let _ = write!(stderr, "{text}").and_then(|()| stderr.flush());
+    STDOUT.settle(SETTLE);
+    STDERR.push(text.to_string().as_bytes());
+}
+
+/// Standard output as a writer of whole pictures: what is written leaves with the next flush.
+#[derive(Debug, Default)]
+pub struct Screen(Vec<u8>);
+
+impl Write for Screen {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        self.0.extend_from_slice(bytes);
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        STDOUT.push(&std::mem::take(&mut self.0));
+        Ok(())
+    }
 }
 
 /// One line to standard output.

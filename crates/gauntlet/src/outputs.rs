@@ -41,6 +41,32 @@ impl Kind {
     }
 }
 
+/// Refuses to write `path` where anything is there already, an empty file, too, or where its folder takes no file.
+///
+/// # Errors
+/// A usage failure that names the path.
+pub fn check_new(path: &Path) -> Result<()> {
+    let next = "another name, in a folder that exists and that you may write to";
+    let refuse = |why: &str| {
+        let what = format!("{} is not written: {why}", path.display());
+        Err(Failure::usage(what, next).into())
+    };
+    if std::fs::symlink_metadata(path).is_ok() {
+        return refuse("it exists, and a log is never written over anything");
+    }
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    if !folder.is_dir() {
+        return refuse("its folder does not exist");
+    }
+    match rustix::fs::access(folder, rustix::fs::Access::WRITE_OK) {
+        Ok(()) => Ok(()),
+        Err(error) => refuse(&format!("its folder takes no file: {error}")),
+    }
+}
+
 /// Refuses to write `path` where it is one of `inputs`, where it exists and is not of this kind, or where its folder does
 /// not exist. An empty file counts as none.
 ///

@@ -9,7 +9,7 @@
 use std::os::fd::{AsFd, BorrowedFd, OwnedFd};
 use std::os::unix::fs::{FileTypeExt, MetadataExt};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -19,6 +19,8 @@ use rustix::termios::{QueueSelector, tcflush};
 use serialport::TTYPort;
 
 use crate::failure::Failure;
+
+mod speed;
 
 /// The speed both device links run at unless told otherwise.
 pub const BAUD: u32 = 115_200;
@@ -253,7 +255,7 @@ fn group_of(path: &Path) -> String {
 #[derive(Debug)]
 struct Shared {
     path: PathBuf,
-    baud: u32,
+    baud: AtomicU32,
     /// What a poll may wait on; `None` while unplugged.
     descriptor: Mutex<Option<Arc<OwnedFd>>>,
     /// Counts reads, so that a poll sees whether the driver took what was there.
@@ -286,7 +288,7 @@ impl Port {
         let device = Device::open(path, baud)?;
         let shared = Arc::new(Shared {
             path: path.to_owned(),
-            baud,
+            baud: AtomicU32::new(baud),
             descriptor: Mutex::new(Some(Arc::clone(&device.descriptor))),
             reads: AtomicU64::new(0),
             replacement: Mutex::new(None),
@@ -357,7 +359,8 @@ fn reopen(shared: &Shared) {
     while !shared.closed.load(Ordering::Acquire) {
         std::thread::sleep(pause);
         pause = (pause * 2).min(REOPEN_LAST);
-        if let Ok(device) = Device::open(&shared.path, shared.baud) {
+        let baud = shared.baud.load(Ordering::Relaxed);
+        if let Ok(device) = Device::open(&shared.path, baud) {
             *lock(&shared.replacement) = Some(device);
             shared.replaced.store(true, Ordering::Release);
             return;
@@ -427,7 +430,7 @@ impl Watch {
     pub(crate) fn of(name: PathBuf, readable: Arc<OwnedFd>) -> Self {
         let shared = Shared {
             path: name,
-            baud: 0,
+            baud: AtomicU32::new(0),
             descriptor: Mutex::new(Some(readable)),
             reads: AtomicU64::new(0),
             replacement: Mutex::new(None),

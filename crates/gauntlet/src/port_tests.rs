@@ -142,3 +142,29 @@ fn every_reason_comes_with_a_next_step() {
     assert!(failure.to_string().contains("/dev/ttyUSB0"));
     assert!(failure.next_step().contains("usermod -aG dialout"));
 }
+
+#[test]
+fn the_speed_changes_on_the_open_port_and_survives_its_return() {
+    let (master, path) = pair();
+    let mut port = Port::open(&path, BAUD).unwrap();
+    let seen = || rustix::termios::tcgetattr(&master).unwrap().output_speed();
+    assert!(port.set_baud(9_600));
+    assert_eq!(seen(), 9_600);
+    rustix::io::write(&master, &[7]).unwrap();
+    assert!(until(|| port.read_ready() == Ok(true)));
+    assert!(port.set_baud(BAUD));
+    assert_eq!(seen(), BAUD);
+    assert_eq!(
+        port.read_ready(),
+        Ok(false),
+        "what came at the old speed is noise"
+    );
+    assert!(port.set_baud(9_600));
+    drop(master);
+    assert!(until(|| port.write(&[1]) == Err(Error::Unplugged)));
+    assert!(port.set_baud(19_200), "a port that is away keeps it");
+    assert_eq!(
+        port.shared.baud.load(std::sync::atomic::Ordering::Relaxed),
+        19_200
+    );
+}

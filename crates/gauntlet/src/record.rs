@@ -1,5 +1,6 @@
 //! What a run hands to whoever watches it: frames, commands, statuses and events, each exactly once.
 
+use bridge::event::Kind;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::Health;
 use gripper::Instant;
@@ -61,8 +62,6 @@ pub enum Sort {
     Note,
     /// Something is wrong.
     Fault,
-    /// A flat hand was taken as calibration.
-    Calibrated,
 }
 
 /// One thing to hand over.
@@ -82,6 +81,8 @@ pub enum Record {
         sort: Sort,
         /// What.
         text: String,
+        /// The same for the program.
+        kind: Kind,
     },
 }
 

@@ -1,36 +1,47 @@
 //! A run of the bridge as a person sees it: heartbeat, keys, live view, log and numbers, until its time is over.
 
+pub mod calibrating;
+mod ending;
 mod numbers;
+mod replies;
+mod shown;
+mod summary;
 
-use std::collections::VecDeque;
 use std::io::IsTerminal;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::State;
-use glove::hand::LIMITS;
-use gripper::Activation;
+use bridge::clutch::Position;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::failure::OrFail;
 use crate::interrupt::Interrupt;
-use crate::live::{Axis, Finger, Key, Live, View};
+use crate::live::{Key, Live, View};
 use crate::platform::Clock;
-use crate::record::{AXES, Record, Sort};
-use crate::session::{Order, Session, Snapshot, Stopped};
-use crate::session_log::{SessionLog, Written};
-use crate::{out, words};
+use crate::record::{Record, Sort};
+use crate::session::{Order, Session, Snapshot};
+use crate::session_log::SessionLog;
+use crate::{note, out};
+use shown::Shown;
 
-pub use numbers::{Numbers, Summary};
+pub use ending::{Ending, Finished, clutch_expired};
+pub use numbers::Numbers;
+pub use replies::Failed;
+pub use summary::Summary;
 
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
 const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
-/// Faults shown at once.
-const SHOWN_FAULTS: usize = 5;
-/// How long a fault stays on the view after it happened.
-const FAULT_SHOWN: Duration = Duration::from_secs(4);
+/// After this long the bridge has seen that the clutch was closed.
+const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
+/// Records of the bring-up that wait for the log, which is made after it: some 30 s.
+const EARLY: usize = 8192;
+/// By then whoever wrote beyond a file's limit was told.
+const FILE_LIMIT_TOLD: Duration = Duration::from_millis(300);
+/// For the hold before Ctrl-Z stops the program.
+const SUSPEND_HOLD: Duration = Duration::from_millis(500);
 
 /// How a run goes.
 #[derive(Debug)]
@@ -54,49 +65,65 @@ pub enum End {
     Asked,
 }
 
-/// What is left when a run is over.
-#[derive(Debug)]
-pub struct Finished {
-    /// Its numbers.
-    pub summary: Summary,
-    /// Its log.
-    pub log: Option<Written>,
-    /// How the gripper was left.
-    pub stopped: Stopped,
-}
-
 /// A session that somebody watches.
 #[derive(Debug)]
 pub struct Run {
     session: Session,
+    /// Where the log will be.
+    log_path: Option<PathBuf>,
     log: Option<SessionLog>,
+    /// What came before the log was made.
+    early: Vec<Record>,
+    early_lost: u64,
+    /// Its end was noted.
+    log_end_noted: bool,
     clock: Clock,
     interrupt: Interrupt,
     numbers: Numbers,
     clutch: bool,
+    /// When a person closed it last.
+    engaged: Option<Instant>,
+    /// It opened by itself, and nobody touched it since.
+    expired: bool,
+    /// Somebody can press keys.
+    attended: bool,
     heartbeat: Option<Instant>,
-    calibrations: u64,
-    recent_faults: VecDeque<(Instant, String)>,
+    shown: Shown,
+    /// The view was not taken for so long that nobody sees it.
+    unseen: bool,
+    /// When a file grew to its limit.
+    file_limit: Option<Instant>,
+    ending: Option<Ending>,
 }
 
 impl Run {
-    /// Watches `session`, and writes what it sees into `log`.
+    /// Watches `session`. What it sees goes into a log at `log_path`, which is made when driving begins: a bring-up that fails
+    /// leaves no file.
     pub fn new(
         session: Session,
-        log: Option<SessionLog>,
+        log_path: Option<PathBuf>,
         clock: Clock,
         interrupt: Interrupt,
     ) -> Self {
         Self {
             session,
-            log,
+            log_path,
+            log: None,
+            early: Vec::new(),
+            early_lost: 0,
+            log_end_noted: false,
             clock,
             interrupt,
             numbers: Numbers::default(),
             clutch: false,
+            engaged: None,
+            expired: false,
+            attended: false,
             heartbeat: None,
-            calibrations: 0,
-            recent_faults: VecDeque::new(),
+            shown: Shown::default(),
+            unseen: false,
+            file_limit: None,
+            ending: None,
         }
     }
 
@@ -161,11 +188,6 @@ impl Run {
         Ok(false)
     }
 
-    /// How often a flat hand was taken as calibration.
-    pub fn calibrations(&self) -> u64 {
-        self.calibrations
-    }
-
     /// Tells the bridge something.
     pub fn order(&self, order: Order) {
         self.session.order(order);
@@ -176,14 +198,33 @@ impl Run {
     /// # Errors
     /// What ended the bridge, or the terminal's fault.
     pub fn drive(&mut self, options: &Options) -> Result<End> {
+        self.start_log()?;
+        let driven = self.watch(options);
+        let unattended = self.expired && !self.attended;
+        self.ending = self
+            .session
+            .snapshot()
+            .map(|seen| Ending::of(&seen, unattended));
+        driven
+    }
+
+    fn watch(&mut self, options: &Options) -> Result<End> {
         let terminal = || "the terminal does not work".to_owned();
         let next = "`gauntlet … | cat`, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
-        self.clutch = options.engage;
+        let suspend = self.interrupt.catch_suspend().or_fail(
+            || "Ctrl-Z cannot be caught".to_owned(),
+            "ending other programs: the system lacks descriptors",
+        )?;
+        if options.engage {
+            self.engage();
+        }
         let started = Instant::now();
         self.numbers.begin();
         let mut last_round = started;
         loop {
+            // Nobody sees the view: as if nobody were there.
+            self.unseen = live.unseen();
             self.round()?;
             let moving = self.session.snapshot().map(|s| s.state.is_moving());
             self.numbers
@@ -192,8 +233,15 @@ impl Run {
             for key in live.keys().or_fail(terminal, next)? {
                 self.obey(key);
             }
-            live.show(|| self.view(options, started.elapsed(), live_keys()))
+            let keys = live.interactive();
+            self.attended = keys;
+            live.show(|| self.view(options, started.elapsed(), keys))
                 .or_fail(terminal, next)?;
+            self.note_log_end(options.quiet);
+            if suspend.asked() {
+                self.hold_for_a_while()?;
+                live.aside(|| suspend.stop()).or_fail(terminal, next)?;
+            }
             // Nobody sees the lines any more: do not drive on unseen.
             if self.interrupt.asked() || out::closed() {
                 return Ok(End::Asked);
@@ -208,39 +256,106 @@ impl Run {
         }
     }
 
-    /// Holds the gripper, ends the session, finishes the log and sums up.
-    ///
-    /// # Errors
-    /// What ended the bridge, or the log's fault.
-    pub fn finish(mut self) -> Result<Finished> {
-        let ended = self.session.stop();
+    /// Opens the clutch, and waits until the hold has left.
+    fn hold_for_a_while(&mut self) -> Result<()> {
+        self.release();
+        let end = Instant::now() + SUSPEND_HOLD;
+        let mut held = false;
+        while !held && Instant::now() < end && !self.interrupt.sleep(ROUND) {
+            self.round()?;
+            held = self.session.snapshot().is_some_and(|seen| {
+                !seen.state.is_moving() && seen.sent.is_none_or(|sent| !sent.follows)
+            });
+        }
+        Ok(())
+    }
+
+    /// Makes the log's file, with what came so far in it.
+    fn start_log(&mut self) -> Result<()> {
+        let Some(path) = &self.log_path else {
+            return Ok(());
+        };
+        let early = std::mem::take(&mut self.early);
+        self.log = Some(SessionLog::create(path, self.clock, early)?);
+        self.interrupt.look_after_file_limit();
+        Ok(())
+    }
+
+    /// Says once that the log ended before the run, where no view shows it.
+    fn note_log_end(&mut self, quiet: bool) {
+        if let Some(text) = self.log_end().filter(|_| quiet && !self.log_end_noted) {
+            self.log_end_noted = true;
+            note!("{text}");
+        }
+    }
+
+    fn log_end(&self) -> Option<String> {
+        let log = self.log.as_ref()?;
+        let fault = log.fault()?;
+        Some(format!(
+            "the log {} ended: {fault}; the run goes on without it",
+            log.path().display()
+        ))
+    }
+
+    /// Holds the gripper, ends the session, finishes the log and sums up. Always: what failed is part of what is left.
+    pub fn finish(mut self) -> Finished {
+        let stopped = self.session.stop();
         self.take_records();
-        let lost = self.session.lost();
+        let lost = self.session.lost() + self.early_lost;
         let counters = self.session.snapshot().map(|s| s.counters);
-        let log = self.log.take().map(SessionLog::finish).transpose();
-        let stopped = ended?;
-        let log = log?.map(|mut written| {
+        let summary = self.numbers.summary(counters, self.session.scheduling());
+        let log = self.log.take().map(|log| {
+            let mut written = log.finish();
             written.lost += lost;
             written
         });
-        Ok(Finished {
-            summary: self.numbers.summary(counters, self.session.scheduling()),
+        Finished {
+            summary,
             log,
             stopped,
-        })
+            ending: self.ending,
+        }
     }
 
     fn obey(&mut self, key: Key) {
         match key {
             Key::End => self.interrupt.ask(),
             Key::Clutch => {
-                self.clutch = !self.clutch;
-                self.heartbeat = None;
-                if !self.clutch {
-                    self.order(Order::Release);
+                if self.clutch {
+                    self.release();
+                } else {
+                    self.engage();
                 }
             }
-            Key::Calibrate => self.order(Order::Calibrate),
+            Key::Open => self.release(),
+            Key::Calibrate => self.order(Order::Calibrate(glove::timing::STILL_WAIT)),
+        }
+    }
+
+    /// Closes the clutch: an act of a person.
+    fn engage(&mut self) {
+        let now = Instant::now();
+        (self.clutch, self.expired) = (true, false);
+        (self.engaged, self.heartbeat) = (Some(now), Some(now));
+        self.order(Order::Engage);
+    }
+
+    /// Opens the clutch, for a person.
+    fn release(&mut self) {
+        (self.clutch, self.expired) = (false, false);
+        self.order(Order::Release);
+    }
+
+    /// Sees that the clutch opened by itself.
+    fn look_at_clutch(&mut self) {
+        let settled = self.engaged.is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
+        let open = self
+            .session
+            .snapshot()
+            .is_some_and(|seen| matches!(seen.clutch, Position::Open | Position::Expired));
+        if self.clutch && settled && open {
+            (self.clutch, self.expired) = (false, true);
         }
     }
 
@@ -255,12 +370,30 @@ impl Run {
         let due = self
             .heartbeat
             .is_none_or(|last| now.duration_since(last) >= HEARTBEAT - ROUND / 2);
-        if self.clutch && due {
+        if self.clutch && due && !self.unseen {
             self.heartbeat = Some(now);
-            self.order(Order::Engage);
+            self.order(Order::Heartbeat);
         }
+        self.look_at_clutch();
+        self.look_at_file_limit();
         self.take_records();
         Ok(())
+    }
+
+    /// SIGXFSZ: of the log, which tells it itself, or of somebody who wants the end.
+    fn look_at_file_limit(&mut self) {
+        if self.interrupt.file_limit() {
+            self.file_limit = Some(Instant::now());
+        }
+        if self
+            .file_limit
+            .is_some_and(|at| at.elapsed() >= FILE_LIMIT_TOLD)
+        {
+            self.file_limit = None;
+            if self.log_end().is_none() {
+                self.interrupt.ask();
+            }
+        }
     }
 
     fn take_records(&mut self) {
@@ -270,28 +403,23 @@ impl Run {
                 Record::Event {
                     sort: Sort::Fault,
                     text,
+                    kind,
                     ..
-                } => {
-                    // The same thing again only renews what is shown.
-                    self.recent_faults.retain(|(_, known)| known != text);
-                    self.recent_faults.push_back((Instant::now(), text.clone()));
-                    if self.recent_faults.len() > SHOWN_FAULTS {
-                        self.recent_faults.pop_front();
-                    }
-                }
-                Record::Event {
-                    sort: Sort::Calibrated,
-                    ..
-                } => self.calibrations += 1,
+                } => self.shown.fault(text, *kind),
+                Record::Status(status) => self.shown.status(status, Instant::now()),
                 _ => {}
             }
             if let Some(log) = &mut self.log {
                 log.take(record);
+            } else if self.log_path.is_some() && self.early.len() < EARLY {
+                self.early.push(record);
+            } else if self.log_path.is_some() {
+                self.early_lost += 1;
             }
         }
     }
 
-    fn view(&mut self, options: &Options, elapsed: Duration, keys: &'static str) -> View {
+    fn view(&mut self, options: &Options, elapsed: Duration, keys: bool) -> View {
         let snapshot = self.session.snapshot();
         let now = self.clock.now();
         let mut view = View {
@@ -301,7 +429,9 @@ impl Run {
             state: "starting".to_owned(),
             following: false,
             fingers: Vec::new(),
+            hand_age: None,
             axes: Vec::new(),
+            gripper_age: None,
             frames_per_s: self.numbers.frames.now(now.as_ticks()),
             cycles_per_s: self.numbers.cycles.now(now.as_ticks()),
             latency_p50: self.numbers.latency.at(0.5),
@@ -309,15 +439,30 @@ impl Run {
             dropped: self.numbers.dropped(),
             faults: self.faults_now(snapshot.as_ref()),
             fault_count: self.numbers.faults(),
-            keys,
+            keys: if keys {
+                "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
+            } else {
+                "Ctrl-C: hold and end"
+            },
         };
         if let Some(snapshot) = &snapshot {
-            view.state = snapshot.state.name().to_owned();
+            view.state = self.state_words(snapshot, keys);
             view.following = snapshot.state.is_moving();
-            view.fingers = fingers(snapshot);
-            view.axes = axes(snapshot);
+            view.fingers = shown::fingers(snapshot);
+            view.hand_age = shown::glove_age(snapshot);
+            view.axes = self.shown.axes(snapshot, Instant::now());
+            view.gripper_age = shown::gripper_age(snapshot);
         }
         view
+    }
+
+    /// The state, and what a person can do about it.
+    fn state_words(&self, snapshot: &Snapshot, keys: bool) -> String {
+        let name = snapshot.state.name();
+        if snapshot.state == bridge::State::Idle && keys && !self.clutch {
+            return format!("{name}: space closes the clutch");
+        }
+        name.to_owned()
     }
 
     fn faults_now(&mut self, snapshot: Option<&Snapshot>) -> Vec<String> {
@@ -330,78 +475,12 @@ impl Run {
                 ));
             }
         }
+        faults.extend(self.log_end());
         if let Some(snapshot) = snapshot {
-            faults.extend(standing_faults(snapshot));
+            let scheduling = self.session.scheduling();
+            let now = Instant::now();
+            faults.extend(self.shown.faults(snapshot, scheduling, now));
         }
-        self.recent_faults
-            .retain(|(at, _)| at.elapsed() < FAULT_SHOWN);
-        faults.extend(self.recent_faults.iter().map(|(_, text)| text.clone()));
         faults
     }
-}
-
-fn live_keys() -> &'static str {
-    "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
-}
-
-/// What is wrong now and stays so.
-fn standing_faults(snapshot: &Snapshot) -> Vec<String> {
-    let mut faults = Vec::new();
-    if let State::Holding(reason) | State::SafeAction(reason) = snapshot.state {
-        faults.push(format!("held: {reason}"));
-    }
-    if let Some(frame) = &snapshot.frame {
-        let health = frame.samples.map(|sample| sample.health);
-        faults.extend(words::lost_sensors(&health));
-    }
-    if let Some(status) = &snapshot.status {
-        if status.fault != gripper::Fault::None {
-            faults.push(format!(
-                "gripper fault {:02X}: {}; {}",
-                status.fault.code(),
-                status.fault.sentence(),
-                status.fault.action()
-            ));
-        }
-        if status.activation != Activation::Ready {
-            faults.push(format!(
-                "the gripper is {}",
-                words::activation(status.activation)
-            ));
-        }
-    }
-    faults
-}
-
-fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
-    let good = match &snapshot.frame {
-        Some(frame) => frame
-            .samples
-            .map(|sample| sample.health == glove::scan::Health::Good),
-        None => [false; glove::hand::SEGMENT_COUNT],
-    };
-    let good = words::fingers_good(&good);
-    words::FINGER_NAMES
-        .iter()
-        .enumerate()
-        .map(|(finger, name)| Finger {
-            name,
-            angles: core::array::from_fn(|joint| snapshot.angles[5 * finger + joint]),
-            limits: core::array::from_fn(|joint| LIMITS[5 * finger + joint]),
-            good: good[finger],
-        })
-        .collect()
-}
-
-fn axes(snapshot: &Snapshot) -> Vec<Axis> {
-    (0..AXES)
-        .map(|axis| Axis {
-            name: words::AXIS_WORDS[axis],
-            asked: snapshot.command.map(|motion| motion.position[axis]),
-            reached: snapshot.status.map(|status| status.position[axis]),
-            word: snapshot
-                .status
-                .map_or("silent", |status| words::contact(status.contact[axis])),
-        })
-        .collect()
 }

@@ -10,13 +10,14 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 
 use anyhow::Result;
+use bridge::calibration::Try;
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
-use bridge::{App, HoldReason, State, Telemetry, WeightsStore};
+use bridge::timing::{HEARTBEAT_TIMEOUT, is_within};
+use bridge::{App, Epoch, HoldReason, Platform, State, Telemetry, WeightsStore};
 use glove::scan::{self, Scanner};
 use gripper::driver::ThreeFinger;
 use gripper::{Activation, Duration, Instant};
-use serde::Serialize;
 
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
@@ -26,6 +27,7 @@ use crate::port::{BAUD, Port, Watch};
 use crate::realtime::{self, Scheduling};
 use crate::record::{AXES, Command, Frame, Imu, Record, Sort};
 use crate::slots::MemorySlot;
+use crate::stopped::{HOLD_WAIT, Stopped};
 
 /// The bridge as a PC runs it.
 pub type PcApp = App<Pc, Port, ThreeFinger<Line>, MemorySlot, AXES>;
@@ -34,64 +36,38 @@ pub type PcApp = App<Pc, Port, ThreeFinger<Line>, MemorySlot, AXES>;
 const ORDERS: usize = 64;
 /// Records that may wait: about 10 s of a run.
 const RECORDS: usize = 4096;
-/// The hold must be confirmed this long after the clutch opened; then the thread ends whatever the gripper does.
-/// Some fifteen replies may be lost meanwhile.
-const HOLD_WAIT: Duration = Duration::from_ticks(1_500_000);
-
-/// How the gripper was left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Stopped {
-    /// Nothing was ever commanded.
-    Untouched,
-    /// The hold left, and the gripper repeated its positions.
-    Held,
-    /// It was told to activate and is not ready: no command stops that.
-    Activating,
-    /// It was commanded before, and did not confirm the hold.
-    NotConfirmed,
-}
-
-impl Stopped {
-    /// What a person should know.
-    ///
-    /// # Errors
-    /// A failure where the gripper may still move.
-    pub fn judge(self) -> Result<&'static str> {
-        match self {
-            Self::Untouched => Ok("the gripper was not commanded"),
-            Self::Held => Ok("the gripper is held where it is"),
-            Self::Activating => Err(Failure::new(
-                "the gripper is activating and cannot be held: its fingers move until that is done",
-                "waiting for its end; in danger switch off the gripper's 24 V supply",
-            )
-            .into()),
-            Self::NotConfirmed => Err(Failure::new(
-                format!(
-                    "the hold was not confirmed: the gripper gave no right answer in {:.1} s",
-                    HOLD_WAIT.as_micros() as f64 / 1e6
-                ),
-                "look at the gripper: an axis comes to rest at most 40 counts from where it was; \
-                 in danger switch off its 24 V supply",
-            )
-            .into()),
-        }
-    }
-}
 
 /// What the bridge can be told.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Order {
-    /// The clutch's heartbeat: send one every 100 ms to keep it closed.
+    /// Close the clutch: an act of a person.
     Engage,
+    /// Keep the clutch closed that was closed last: send one every 100 ms. It closes nothing.
+    Heartbeat,
     /// Open the clutch: hold.
     Release,
     /// Activate the gripper: the fingers move.
     Activate,
-    /// Take the next good frame as the flat hand.
-    Calibrate,
+    /// Take the hand as flat, once it has been still for a second; within so long.
+    Calibrate(Duration),
+    /// Take the newest calibration back.
+    UndoCalibration,
     /// Hold, and end.
     Stop,
+}
+
+impl Order {
+    /// Whether it makes motion possible: then it counts only while it is young.
+    fn moves(self) -> bool {
+        matches!(self, Self::Engage | Self::Heartbeat | Self::Activate)
+    }
+}
+
+/// An order, and when it was given. Between that and its being read a process can stand still.
+#[derive(Debug, Clone, Copy)]
+struct Given {
+    order: Order,
+    at: Instant,
 }
 
 /// The state of everything at one moment.
@@ -114,7 +90,8 @@ pub struct Parts {
 #[derive(Debug)]
 pub struct Session {
     thread: Option<JoinHandle<Stopped>>,
-    orders: SyncSender<Order>,
+    orders: SyncSender<Given>,
+    clock: Clock,
     records: Receiver<Record>,
     snapshot: Arc<Mutex<Option<Snapshot>>>,
     lost: Arc<AtomicU64>,
@@ -145,6 +122,7 @@ impl Session {
         load(&mut store, &parts.image)?;
         let worker = Worker {
             orders: order_queue,
+            epoch: None,
             records: record_queue,
             snapshot: Arc::clone(&snapshot),
             lost: Arc::clone(&lost),
@@ -161,7 +139,8 @@ impl Session {
                         baud: BAUD,
                         ..scan::Config::default()
                     },
-                );
+                )
+                .with_set_baud(Port::set_baud);
                 let config = parts.gripper.driver_config(Settings::default());
                 let gripper = ThreeFinger::new(parts.gripper, config);
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
@@ -175,6 +154,7 @@ impl Session {
         Ok(Self {
             thread: Some(thread),
             orders,
+            clock,
             records,
             snapshot,
             lost,
@@ -185,7 +165,8 @@ impl Session {
 
     /// Tells the bridge something. Returns whether it was taken: not when the queue is full or the bridge has ended.
     pub fn order(&self, order: Order) -> bool {
-        self.orders.try_send(order).is_ok()
+        let at = self.clock.now();
+        self.orders.try_send(Given { order, at }).is_ok()
     }
 
     /// What happened since the last call, in order. Never waits.
@@ -264,7 +245,9 @@ fn load(store: &mut WeightsStore<MemorySlot>, image: &[u8]) -> Result<()> {
 
 /// The thread's side of the queues.
 struct Worker {
-    orders: Receiver<Order>,
+    orders: Receiver<Given>,
+    /// Of the newest closing of the clutch.
+    epoch: Option<Epoch>,
     records: SyncSender<Record>,
     snapshot: Arc<Mutex<Option<Snapshot>>>,
     lost: Arc<AtomicU64>,
@@ -302,18 +285,39 @@ impl Worker {
     fn obey(&mut self, app: &mut PcApp) {
         loop {
             match self.orders.try_recv() {
-                Ok(Order::Engage) if self.ending.is_none() => app.engage(),
-                Ok(Order::Activate) if self.ending.is_none() => {
-                    self.activation_asked = true;
-                    app.activate();
-                }
-                Ok(Order::Calibrate) if self.ending.is_none() => app.calibrate_flat_hand(),
-                Ok(Order::Engage | Order::Activate | Order::Calibrate) => {}
-                Ok(Order::Release) => app.release(),
                 // Whoever gave orders is gone: the same as a stop.
-                Ok(Order::Stop) | Err(TryRecvError::Disconnected) => return self.end(app),
+                Ok(Given {
+                    order: Order::Stop, ..
+                })
+                | Err(TryRecvError::Disconnected) => return self.end(app),
+                Ok(given) => self.obey_one(app, given),
                 Err(TryRecvError::Empty) => return,
             }
+        }
+    }
+
+    fn obey_one(&mut self, app: &mut PcApp, given: Given) {
+        let now = app.platform_mut().now();
+        let old = !is_within(now, given.at, HEARTBEAT_TIMEOUT);
+        if given.order.moves() && (old || self.ending.is_some()) {
+            return;
+        }
+        match given.order {
+            Order::Engage => self.epoch = Some(app.engage()),
+            Order::Heartbeat => {
+                if let Some(epoch) = self.epoch {
+                    // Refused where the clutch is open; telemetry tells so.
+                    let _ = app.heartbeat(epoch);
+                }
+            }
+            Order::Release => app.release(),
+            Order::Activate => {
+                self.activation_asked = true;
+                app.activate();
+            }
+            Order::Calibrate(wait) => app.calibrate_flat_hand_within(wait),
+            Order::UndoCalibration => app.undo_calibration(),
+            Order::Stop => self.end(app),
         }
     }
 
@@ -367,6 +371,7 @@ impl Worker {
                 at: event.at,
                 sort: sort(&event.kind),
                 text: event.kind.to_string(),
+                kind: event.kind,
             });
         }
         self.seen = Seen {
@@ -412,7 +417,6 @@ fn hold_confirmed(telemetry: &Telemetry<AXES>, since: Instant) -> bool {
 /// Whether an event is something wrong, or merely something that happened.
 fn sort(kind: &Kind) -> Sort {
     let fault = match kind {
-        Kind::Calibrated => return Sort::Calibrated,
         // A hold is a fault where it ends motion; which reason follows which is only told.
         Kind::State { from, to } => match to {
             State::Holding(HoldReason::Settling | HoldReason::GripperNotReady(_)) => false,
@@ -425,7 +429,7 @@ fn sort(kind: &Kind) -> Sort {
         | Kind::SensorRestarted { .. }
         | Kind::Glove { answers: false }
         | Kind::Gripper { answers: false }
-        | Kind::CalibrationFailed { .. }
+        | Kind::Calibration(Try::Refused(_))
         | Kind::NoWeights
         | Kind::Refused(_) => true,
         _ => false,

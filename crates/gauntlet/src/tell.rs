@@ -29,15 +29,7 @@ impl Tell {
     /// What became of the session log.
     pub fn log(&self, log: Option<&Written>) {
         if let Some(log) = log {
-            let lost = match log.lost {
-                0 => String::new(),
-                lost => format!(", {lost} records lost: the disk was too slow"),
-            };
-            self.say(format_args!(
-                "log        {} with {} messages{lost}",
-                log.path.display(),
-                log.messages
-            ));
+            self.say(format_args!("log        {}", log.line()));
         }
     }
 }

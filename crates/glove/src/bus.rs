@@ -29,6 +29,8 @@ pub enum Error {
         /// Bytes that came.
         received: u8,
     },
+    /// The reply was read only after its deadline, for the caller stood still: it says nothing about now and was thrown away.
+    Stalled,
     /// The serial bridge reported a status its data sheet does not have.
     Status(u8),
     /// The serial bridge does not answer; it is being resynchronised.
@@ -62,6 +64,7 @@ impl core::fmt::Display for Error {
             Error::Lost { expected, received } => {
                 write!(f, "{received} of {expected} reply bytes arrived")
             }
+            Error::Stalled => f.write_str("the reply lay unread past its deadline"),
             Error::Status(code) => write!(f, "unknown I2C status {code:#04X}"),
             Error::NoAnswer => f.write_str("the serial bridge does not answer"),
             Error::Port => f.write_str("the serial port failed"),

@@ -11,6 +11,7 @@
 use nalgebra::UnitQuaternion;
 
 mod calibration;
+pub mod flat;
 mod rotation;
 
 pub use calibration::Calibration;

@@ -14,15 +14,17 @@
 use crate::Instant;
 use crate::bus::{Batch, Bus, Error, Reply};
 use crate::timing::{self, after};
-use command::{Command, Expected};
+use command::Expected;
 use heapless::Vec;
 
 mod blocking;
 mod command;
 mod recovery;
+mod speed;
 
 pub use blocking::Blocking;
 pub use command::{baud_divisor, register};
+pub use speed::SetBaud;
 
 /// A serial port that does not block: `read_ready` before `read`, and writes that go to a queue.
 pub trait SerialPort: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write {}
@@ -34,10 +36,13 @@ const REPLY_MAX: usize = 49;
 /// Most bytes taken from the port in one poll, so that a babbling line cannot hold the caller.
 const READ_MAX: usize = 128;
 
+/// Most bytes thrown away before a question: what a system's buffer holds. More means a line that babbles.
+const DISCARD_MAX: usize = 4_096;
+
 /// How the serial bridge is run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Config {
-    /// Baud of the port, which must be open at it.
+    /// Baud of the port, which must be open at it: 9,600 for a chip fresh from reset, or what it was set to.
     pub baud: u32,
     /// Value of I2CClkL and I2CClkH ([`timing::I2C_DIVIDER`]); `None` leaves the chip's.
     pub clock_divider: Option<u8>,
@@ -63,10 +68,14 @@ pub struct Counters {
     pub lost: u32,
     /// Bytes that belonged to no reply: noise, or late.
     pub stray: u32,
+    /// Replies thrown away because they were read after their deadline: the caller stood still.
+    pub stalled: u32,
     /// Times the serial bridge lost step.
     pub resyncs: u32,
     /// Failures of the serial port.
     pub port_errors: u32,
+    /// Times the chip was found at its reset speed, as after a power cut, and set to the port's again.
+    pub restarts: u32,
     /// Times the chip did not keep the I²C clock it was given.
     pub clock_refused: u32,
 }
@@ -82,6 +91,8 @@ enum State {
         deadline: Instant,
         tries: u8,
     },
+    /// The chip was found at its reset speed and told another: that many tries so far, the new one is asked at `until`.
+    Switch { until: Instant, tries: u8 },
     /// The I²C clock was written; waiting for it to be read back.
     Setup { deadline: Instant, tries: u8 },
     /// Ready.
@@ -123,6 +134,9 @@ const DIAGNOSE_TRIES: u8 = 3;
 pub struct Sc18im<S> {
     serial: S,
     config: Config,
+    /// Speed of the port now, and how to change it.
+    line_baud: u32,
+    set_baud: Option<SetBaud<S>>,
     state: State,
     received: Vec<u8, REPLY_MAX>,
     counters: Counters,
@@ -138,6 +152,8 @@ impl<S> Sc18im<S> {
         Self {
             serial,
             config,
+            line_baud: config.baud,
+            set_baud: None,
             state,
             received: Vec::new(),
             counters: Counters::default(),
@@ -158,39 +174,13 @@ impl<S> Sc18im<S> {
     pub fn release(self) -> S {
         self.serial
     }
-
-    /// Says that the port now runs at `baud` (after [`Sc18im::change_baud`]): deadlines follow.
-    pub fn set_line_baud(&mut self, baud: u32) {
-        self.config.baud = baud;
-    }
 }
 
 impl<S: SerialPort> Sc18im<S> {
-    /// Tells the chip to change its baud: `57 00 lo 01 hi 50`, alone.
-    ///
-    /// Nothing answers. The machine pauses for the bytes plus [`timing::BAUD_SETTLE`]; reopen the port at the new speed
-    /// within that time, then call [`Sc18im::set_line_baud`].
-    ///
-    /// # Errors
-    /// [`Error::Unsupported`] for a baud the chip cannot make, [`Error::Busy`], [`Error::NoAnswer`], [`Error::Port`].
-    pub fn change_baud(&mut self, baud: u32, now: Instant) -> Result<(), Error> {
-        let [low, high] = baud_divisor(baud).ok_or(Error::Unsupported)?.to_le_bytes();
-        self.require_idle()?;
-        let mut command = Command::new();
-        let values = [(register::BRG0, low), (register::BRG1, high)];
-        command::append_write_registers(&mut command, &values)?;
-        self.send_or_fail(&command, now)?;
-        let wait = timing::serial(command.len(), self.config.baud) + timing::BAUD_SETTLE;
-        self.state = State::Pause {
-            until: after(now, wait),
-        };
-        Ok(())
-    }
-
     fn require_idle(&self) -> Result<(), Error> {
         match self.state {
             State::Idle => Ok(()),
-            State::Down { .. } | State::Probe { .. } | State::Setup { .. } => Err(Error::NoAnswer),
+            _ if self.tries().is_some() => Err(Error::NoAnswer),
             _ => Err(Error::Busy),
         }
     }
@@ -242,6 +232,16 @@ impl<S: SerialPort> Sc18im<S> {
         Ok(total)
     }
 
+    /// Throws away all that waits, at most [`DISCARD_MAX`] bytes; false if more is there, as on a line that babbles.
+    fn discard(&mut self) -> Result<bool, Error> {
+        for _ in 0..DISCARD_MAX / READ_MAX {
+            if self.pump(0)? < READ_MAX {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
     fn port_error(&mut self) -> Error {
         self.counters.port_errors = self.counters.port_errors.wrapping_add(1);
         Error::Port
@@ -255,6 +255,7 @@ impl<S: SerialPort> Sc18im<S> {
                 deadline,
                 tries,
             } => self.poll_probe(settled, deadline, tries, now),
+            State::Switch { until, tries } => self.poll_switch(until, tries, now),
             State::Setup { deadline, tries } => self.poll_setup(deadline, tries, now),
             State::Idle => Ok(None),
             State::Exchange { expected, deadline } => self.poll_exchange(expected, deadline, now),
@@ -285,11 +286,19 @@ impl<S: SerialPort> Sc18im<S> {
         now: Instant,
     ) -> Result<Option<Reply>, Error> {
         self.pump(expected.bytes)?;
-        if self.received.len() >= expected.bytes {
-            return self.finish(expected, now);
-        }
+        let complete = self.received.len() >= expected.bytes;
         if now >= deadline {
+            // The deadline is judged before the bytes: what lay there while the caller stood still is no news.
+            if complete && self.discard()? {
+                self.counters.stalled = self.counters.stalled.wrapping_add(1);
+                self.state = State::Idle;
+                return Err(Error::Stalled);
+            }
             self.drain(expected, 0, now);
+            return Ok(None);
+        }
+        if complete {
+            return self.finish(expected, now);
         }
         Ok(None)
     }
@@ -330,18 +339,20 @@ impl<S: SerialPort> Bus for Sc18im<S> {
         let (command, expected) = command::batch(batch)?;
         self.require_idle()?;
         // What is there before the question is not its answer.
-        if self.pump(0).is_err() {
-            self.go_down(now, 0);
-            return Err(Error::Port);
+        match self.discard() {
+            Ok(true) => {}
+            Ok(false) => {
+                self.go_down(now, 0);
+                return Err(Error::NoAnswer);
+            }
+            Err(_) => {
+                self.go_down(now, 0);
+                return Err(Error::Port);
+            }
         }
         self.received.clear();
         self.send_or_fail(&command, now)?;
-        let wait = timing::reply(
-            command.len(),
-            expected.bytes,
-            expected.i2c,
-            self.config.baud,
-        );
+        let wait = timing::reply(command.len(), expected.bytes, expected.i2c, self.line_baud);
         self.state = State::Exchange {
             expected,
             deadline: after(now, wait),
@@ -358,12 +369,7 @@ impl<S: SerialPort> Bus for Sc18im<S> {
             Ok(reply) => reply.map(Ok),
             Err(error) => {
                 if error == Error::Port {
-                    let tries = match self.state {
-                        State::Down { tries, .. }
-                        | State::Probe { tries, .. }
-                        | State::Setup { tries, .. } => tries.saturating_add(1),
-                        _ => 0,
-                    };
+                    let tries = self.tries().map_or(0, |tries| tries.saturating_add(1));
                     self.go_down(now, tries);
                 }
                 asked.then_some(Err(error))
@@ -383,15 +389,12 @@ impl<S: SerialPort> Bus for Sc18im<S> {
             State::Diagnose {
                 deadline, settled, ..
             } => Some(settled.map_or(deadline, |(_, until)| until)),
-            State::Pause { until } => Some(until),
+            State::Pause { until } | State::Switch { until, .. } => Some(until),
         }
     }
 
     fn is_up(&self) -> bool {
-        !matches!(
-            self.state,
-            State::Down { .. } | State::Probe { .. } | State::Setup { .. }
-        )
+        self.tries().is_none()
     }
 
     fn is_dead(&self) -> bool {

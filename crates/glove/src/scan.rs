@@ -177,6 +177,14 @@ impl<S: sc18im::SerialPort> Scanner<S> {
         Self::on(Sc18im::new(serial, serial_config), config)
     }
 
+    /// Gives the scanner a way to change the port's speed: a glove whose power was cut speaks 9,600 baud again, and is found and
+    /// set to the port's speed within seconds. Without one it stays silent.
+    #[must_use]
+    pub fn with_set_baud(mut self, set_baud: sc18im::SetBaud<S>) -> Self {
+        self.bus = self.bus.with_set_baud(set_baud);
+        self
+    }
+
     /// The port, for a caller that must wait on it.
     pub fn serial_mut(&mut self) -> &mut S {
         self.bus.serial_mut()

@@ -95,6 +95,17 @@ pub const STANDSTILL: Duration = Duration::from_ticks(100_000);
 /// The frozen sensor is restarted after this long.
 pub const FROZEN_RESTART: Duration = Duration::from_ticks(1_000_000);
 
+/// A calibration takes the mean of a hand that is still for this long: 37 scans at 115200 baud, so that the sensors' noise
+/// of a digit averages out and a hand that only pauses between two motions is not taken.
+pub const STILL_FOR: Duration = Duration::from_ticks(1_000_000);
+
+/// Longest time without a good sample of a sensor that the second of stillness outlasts: seven scans at 115200 baud. One
+/// flipped bit must not start it anew, a sensor that is away must.
+pub const STILL_GAP: Duration = Duration::from_ticks(200_000);
+
+/// What a calibration asked for in passing may wait: the second of stillness, and one for the hand to come to rest.
+pub const STILL_WAIT: Duration = Duration::from_ticks(2_000_000);
+
 /// Time `bytes` take on the serial line at `baud`, rounded up. A baud of zero counts as 1.
 pub fn serial(bytes: usize, baud: u32) -> Duration {
     let bits = bytes as u64 * BITS_PER_BYTE;

@@ -80,6 +80,8 @@ struct State {
     bridge: Sc18im,
     bus: Bus,
     hand: Hand,
+    /// Without power: silent and deaf.
+    off: bool,
 }
 
 /// The moving hand with the sensors fixed to it.
@@ -133,6 +135,7 @@ impl VirtualGlove {
             bridge: Sc18im::new(config.chip, config.baud, config.power_on),
             bus: Bus::new(config.power_on),
             hand,
+            off: false,
         };
         Self {
             state: Arc::new(Mutex::new(state)),
@@ -140,10 +143,19 @@ impl VirtualGlove {
     }
 
     /// Calls `act` with the chip, the bus and the source of orientations.
-    fn with<T>(&self, act: impl FnOnce(&mut Sc18im, &mut Bus, bus::Orientation<'_>) -> T) -> T {
+    /// `None` without power.
+    fn with<T>(
+        &self,
+        act: impl FnOnce(&mut Sc18im, &mut Bus, bus::Orientation<'_>) -> T,
+    ) -> Option<T> {
         let mut state = lock(&self.state);
-        let State { bridge, bus, hand } = &mut *state;
-        act(bridge, bus, &mut |index, at| hand.orientation(index, at))
+        let State {
+            bridge,
+            bus,
+            hand,
+            off,
+        } = &mut *state;
+        (!*off).then(|| act(bridge, bus, &mut |index, at| hand.orientation(index, at)))
     }
 }
 
@@ -161,10 +173,12 @@ impl Device for VirtualGlove {
             bridge.proceed(now, bus, orientation);
             bridge.transmit(out)
         })
+        .unwrap_or(0)
     }
 
     fn next_due(&self) -> Option<Instant> {
-        lock(&self.state).bridge.next_due()
+        let state = lock(&self.state);
+        state.bridge.next_due().filter(|_| !state.off)
     }
 
     fn baud(&self) -> u32 {

@@ -1,6 +1,7 @@
 //! What the host protocol may do with the loop.
 
 use super::App;
+use crate::clutch::{Epoch, HeartbeatRefusal, Position};
 use crate::config::Config;
 use crate::platform::{Platform, Slot};
 use crate::store::WeightsStore;
@@ -15,16 +16,23 @@ pub trait Controls<const X: usize> {
 
     /// See [`App::is_engaged`].
     fn is_engaged(&self) -> bool;
-    /// See [`App::heartbeat_comes`].
-    fn heartbeat_comes(&self) -> bool;
+    /// See [`App::clutch`].
+    fn clutch(&self) -> Position;
     /// See [`App::engage`].
-    fn engage(&mut self);
+    fn engage(&mut self) -> Epoch;
+    /// See [`App::heartbeat`].
+    ///
+    /// # Errors
+    /// As there.
+    fn heartbeat(&mut self, epoch: Epoch) -> Result<(), HeartbeatRefusal>;
     /// See [`App::release`].
     fn release(&mut self);
     /// See [`App::activate`].
     fn activate(&mut self);
     /// See [`App::calibrate_flat_hand`].
     fn calibrate_flat_hand(&mut self);
+    /// See [`App::undo_calibration`].
+    fn undo_calibration(&mut self);
     /// See [`App::config`].
     fn config(&self) -> &Config<X>;
     /// See [`App::set_config`].
@@ -53,12 +61,16 @@ where
         self.is_engaged()
     }
 
-    fn heartbeat_comes(&self) -> bool {
-        self.heartbeat_comes()
+    fn clutch(&self) -> Position {
+        self.clutch()
     }
 
-    fn engage(&mut self) {
-        self.engage();
+    fn engage(&mut self) -> Epoch {
+        self.engage()
+    }
+
+    fn heartbeat(&mut self, epoch: Epoch) -> Result<(), HeartbeatRefusal> {
+        self.heartbeat(epoch)
     }
 
     fn release(&mut self) {
@@ -71,6 +83,10 @@ where
 
     fn calibrate_flat_hand(&mut self) {
         self.calibrate_flat_hand();
+    }
+
+    fn undo_calibration(&mut self) {
+        self.undo_calibration();
     }
 
     fn config(&self) -> &Config<X> {

@@ -11,11 +11,13 @@
 //! driver handed the request that carries the command to its port: seen by the link's count of writing requests going up
 //! in a poll while the command is set. The 29 bytes of the request then take 2.5 ms at 115200 baud.
 
+mod calibrating;
 mod controls;
 mod tick;
 
 pub use controls::Controls;
 
+use crate::clutch::{Clutch, Epoch, HeartbeatRefusal, Position};
 use crate::config::Config;
 use crate::event::{self, Event, Kind, Request};
 use crate::platform::{Platform, Slot};
@@ -23,9 +25,10 @@ use crate::posture::Posture;
 use crate::store::{Expected, WeightsStore};
 use crate::supervisor::{Hand, State, Supervisor};
 use crate::telemetry::{Sent, Telemetry};
-use crate::{HIDDEN, Instant, timing};
+use crate::{HIDDEN, Instant};
+use calibrating::Calibrating;
 use embedded_io::{Read, ReadReady, Write};
-use glove::hand::{Calibration, JOINT_COUNT, SEGMENT_COUNT};
+use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::Scanner;
 use gripper::{Gripper, Status};
 use hae::image::JointOrder;
@@ -54,7 +57,9 @@ where
     supervisor: Supervisor<X>,
     posture: Posture,
     hand: Option<Hand<X>>,
-    heartbeat: Option<Instant>,
+    clutch: Clutch,
+    /// Of the newest closing.
+    epoch: Epoch,
     /// Next step of the supervisor on its grid.
     due: Option<Instant>,
     /// What the driver was told last; `at` is when it was decided until it leaves.
@@ -62,7 +67,9 @@ where
     stashed: Option<Result<Status<X>, R::Error>>,
     gripper_error: Option<R::Error>,
     sensors: Sensors,
-    calibration_until: Option<Instant>,
+    calibrating: Calibrating,
+    /// The axis that stood still in the newest step.
+    stands: Option<u8>,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
     telemetry: Telemetry<X>,
@@ -103,15 +110,17 @@ where
             gripper,
             store,
             supervisor: Supervisor::new(config),
-            posture: Posture::new(config.settings().side, Calibration::identity()),
+            posture: Posture::new(config.settings().side, None),
             hand: None,
-            heartbeat: None,
+            clutch: Clutch::Open,
+            epoch: 0,
             due: None,
             order: None,
             stashed: None,
             gripper_error: None,
             sensors: Sensors::default(),
-            calibration_until: None,
+            calibrating: Calibrating::default(),
+            stands: None,
             weights: None,
             frame_at: None,
             events: heapless::Deque::new(),
@@ -150,18 +159,32 @@ where
         }
     }
 
-    /// Closes the clutch, and keeps it closed for 250 ms: call it every 100 ms.
-    pub fn engage(&mut self) {
+    /// Closes the clutch: **an act of a person**. It stays closed while [`App::heartbeat`] is called with the epoch that comes
+    /// back, every 100 ms. A gripper that is [`State::Faulted`] stays so until the clutch was opened.
+    pub fn engage(&mut self) -> Epoch {
         let now = self.platform.now();
-        if self.heartbeat.replace(now).is_none() {
-            self.due = Some(now);
-        }
+        self.epoch = self.epoch.wrapping_add(1);
+        self.clutch = Clutch::Closed {
+            epoch: self.epoch,
+            beat: now,
+        };
+        self.due = Some(now);
         self.lock();
+        self.epoch
     }
 
-    /// Opens the clutch: the next step holds.
+    /// Keeps the clutch closed for another 250 ms; closes nothing.
+    ///
+    /// # Errors
+    /// The clutch is open, opened by itself, or was closed anew since: nothing changes then.
+    pub fn heartbeat(&mut self, epoch: Epoch) -> Result<(), HeartbeatRefusal> {
+        let now = self.platform.now();
+        self.clutch.beat(now, epoch)
+    }
+
+    /// Opens the clutch: the next step holds. Always obeyed.
     pub fn release(&mut self) {
-        self.heartbeat = None;
+        self.clutch = Clutch::Open;
         self.due = Some(self.platform.now());
     }
 
@@ -176,32 +199,6 @@ where
         }
     }
 
-    /// Takes the next complete frame as the flat hand: every joint angle of it becomes zero. An event tells the end,
-    /// after 2 s at the latest. Refused, with an event, while the clutch is closed.
-    pub fn calibrate_flat_hand(&mut self) {
-        let now = self.platform.now();
-        if self.is_engaged() {
-            self.tell(now, Kind::Refused(Request::Calibrate));
-        } else {
-            self.calibration_until = now.checked_add_duration(timing::CALIBRATION_WAIT);
-        }
-    }
-
-    /// Takes a calibration that was made before. Refused, with an event, while the clutch is closed.
-    pub fn set_calibration(&mut self, calibration: Calibration) {
-        let now = self.platform.now();
-        if self.is_engaged() {
-            self.tell(now, Kind::Refused(Request::Calibrate));
-        } else {
-            self.calibrate(calibration);
-        }
-    }
-
-    /// The calibration in use.
-    pub fn calibration(&self) -> &Calibration {
-        self.posture.calibration()
-    }
-
     /// Takes another configuration.
     ///
     /// # Errors
@@ -211,7 +208,8 @@ where
             return Err(config);
         }
         if config.settings().side != self.config().settings().side {
-            self.posture = Posture::new(config.settings().side, *self.posture.calibration());
+            self.posture =
+                Posture::new(config.settings().side, self.posture.calibration().copied());
         }
         self.supervisor.configure(config);
         Ok(())
@@ -222,21 +220,15 @@ where
         self.supervisor.config()
     }
 
-    /// Whether the clutch is closed, or motion under it has not ended.
+    /// Whether the clutch is closed, or a hold or fault under it was not released yet.
     pub fn is_engaged(&self) -> bool {
-        self.heartbeat.is_some() || self.supervisor.state() != State::Idle
+        self.clutch != Clutch::Open || self.supervisor.state() != State::Idle
     }
 
-    /// Whether the clutch's heartbeat comes. Where it stopped, the gripper is held, and [`App::is_engaged`] stays true until
-    /// somebody releases.
-    pub fn heartbeat_comes(&self) -> bool {
-        self.heartbeat.is_some_and(|beat| {
-            self.telemetry
-                .now
-                .checked_duration_since(beat)
-                // One from after the newest step has just come.
-                .is_none_or(|age| age < timing::HEARTBEAT_TIMEOUT)
-        })
+    /// Where the clutch is. Where it is lost or expired the gripper is held, and [`App::is_engaged`] stays true until somebody
+    /// releases.
+    pub fn clutch(&self) -> Position {
+        self.clutch.position(self.telemetry.now)
     }
 
     /// What is known after the newest step.

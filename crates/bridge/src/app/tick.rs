@@ -1,14 +1,14 @@
 //! What one step does, piece by piece.
 
 use super::App;
-use crate::event::{Event, Kind, Request};
+use crate::event::{Event, Kind};
 use crate::platform::{Platform, Slot};
 use crate::posture;
 use crate::supervisor::{Hand, Inputs, Output, State, Weights};
 use crate::telemetry::{Sent, bump};
-use crate::{Duration, HIDDEN, HoldReason, Instant, timing};
+use crate::{HIDDEN, HoldReason, Instant, timing};
 use embedded_io::{Read, ReadReady, Write};
-use glove::hand::{Calibration, JOINT_COUNT, SEGMENT_COUNT};
+use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::Frame;
 use gripper::registers::Fault;
 use gripper::{Gripper, Status};
@@ -28,7 +28,7 @@ where
         if sent
             && let Some(order) = self
                 .order
-                .filter(|order| age(now, order.stamp) <= timing::MAX_AGE)
+                .filter(|order| timing::is_fresh(now, order.stamp))
         {
             self.telemetry.take_sent(Sent { at: now, ..order });
         }
@@ -77,6 +77,9 @@ where
                 .store
                 .map::<JOINT_COUNT, HIDDEN, X>()
                 .ok_or(HoldReason::NoWeights)?;
+            if !self.posture.is_calibrated() {
+                return Err(HoldReason::NotCalibrated);
+            }
             map.eval(&reading.angles)
                 .map_err(|_| HoldReason::InputRefused)
         });
@@ -104,7 +107,7 @@ where
                     self.sensors.lost &= !bit;
                     self.tell(now, Kind::SensorBack { segment });
                 }
-            } else if self.sensors.lost & bit == 0 && age(now, *seen) > timing::MAX_AGE {
+            } else if self.sensors.lost & bit == 0 && !timing::is_fresh(now, *seen) {
                 self.sensors.lost |= bit;
                 self.tell(now, Kind::SensorLost { segment });
             }
@@ -121,30 +124,11 @@ where
         }
     }
 
-    fn try_calibration(&mut self, now: Instant, frame: &Frame) {
-        if self.calibration_until.is_none() || posture::missing(frame) != 0 {
-            return;
-        }
-        self.calibration_until = None;
-        if self.is_engaged() {
-            self.tell(now, Kind::Refused(Request::Calibrate));
-            return;
-        }
-        let orientations = frame.samples.map(|sample| sample.orientation);
-        self.calibrate(Calibration::from_flat_hand(&orientations));
-        self.tell(now, Kind::Calibrated);
-    }
-
-    /// A calibration belongs to the headings the sensors have now; at least their first start has happened or will.
-    pub(super) fn calibrate(&mut self, calibration: Calibration) {
-        self.posture.calibrate(calibration);
-        self.sensors.starts = Some(self.scanner.counters().starts.map(|starts| starts.max(1)));
-    }
-
     /// What is told when nothing happens.
     pub(super) fn watch(&mut self, now: Instant) {
-        let stale =
-            |stamp: Option<Instant>| stamp.is_none_or(|stamp| age(now, stamp) > timing::SILENT);
+        let stale = |stamp: Option<Instant>| {
+            !stamp.is_some_and(|stamp| timing::is_within(now, stamp, timing::SILENT))
+        };
         if self.telemetry.gripper_answers && stale(self.telemetry.status.map(|status| status.stamp))
         {
             self.telemetry.gripper_answers = false;
@@ -154,14 +138,7 @@ where
             self.telemetry.glove_answers = false;
             self.tell(now, Kind::Glove { answers: false });
         }
-        if self.calibration_until.is_some_and(|until| now >= until) {
-            self.calibration_until = None;
-            let missing = match &self.telemetry.frame {
-                Some(frame) if self.telemetry.glove_answers => posture::missing(frame),
-                _ => u16::MAX,
-            };
-            self.tell(now, Kind::CalibrationFailed { missing });
-        }
+        self.watch_calibration(now);
         let weights = self
             .store
             .active()
@@ -184,8 +161,9 @@ where
     }
 
     pub(super) fn supervise(&mut self, now: Instant, fresh: bool) {
+        self.telemetry.clutch = self.clutch.settle(now);
         let inputs = Inputs {
-            heartbeat: self.heartbeat,
+            clutch: self.clutch,
             hand: self.hand,
             status: self.telemetry.status,
             weights: match (self.store.progress(), self.store.active()) {
@@ -226,6 +204,9 @@ where
             bump(&mut counters.late_steps);
             let us = u32::try_from(late.as_micros()).unwrap_or(u32::MAX);
             counters.worst_late_us = counters.worst_late_us.max(us);
+            if late > timing::LONGEST_GAP {
+                bump(&mut counters.stalls);
+            }
         }
         if output.before.is_moving() && !output.state.is_moving() {
             match output.state {
@@ -244,6 +225,10 @@ where
                 },
             );
         }
+        if let Some(axis) = output.stands.filter(|_| self.stands != output.stands) {
+            self.tell(now, Kind::AxisStands { axis });
+        }
+        self.stands = output.stands;
         if let Some(by) = output.late {
             self.tell(now, Kind::Late { by });
         }
@@ -283,9 +268,4 @@ fn next_on_grid(due: Option<Instant>, now: Instant) -> Instant {
         Some(next) if next > now => next,
         _ => after(now),
     }
-}
-
-fn age(now: Instant, stamp: Instant) -> Duration {
-    now.checked_duration_since(stamp)
-        .unwrap_or(Duration::from_ticks(0))
 }

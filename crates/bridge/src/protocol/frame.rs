@@ -105,6 +105,12 @@ impl Decoder {
         result
     }
 
+    /// Drops the frame under way, if one is: everything until the next zero.
+    pub fn skip(&mut self) {
+        self.skipping |= !self.gathered.is_empty();
+        self.gathered.clear();
+    }
+
     fn finish<T>(&mut self, take: impl FnOnce(&[u8]) -> T) -> Option<T> {
         // Zeros in a row are idle line, not an error: senders start with one to end whatever noise came before.
         if self.gathered.is_empty() {

@@ -3,6 +3,8 @@
 //! The order of enum variants and struct fields **is** the wire format (postcard writes a variant's index and fields in
 //! order): append only, and raise [`VERSION`] when anything else changes. `docs/protocol.md` fixes it.
 
+use crate::calibration::CalibrationState;
+use crate::clutch::{Epoch, HeartbeatRefusal, Position};
 use crate::config::SafeAction;
 use crate::{State, filter, store};
 use glove::hand::{JOINT_COUNT, Side};
@@ -12,7 +14,11 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.
-pub const VERSION: u16 = 2;
+pub const VERSION: u16 = 3;
+/// The oldest version whose bridge a host of this version can ask and flash. Version 3 kept the numbers and answers of
+/// version 2's calls but for [`Call::Engage`]'s; a bridge of version 2 is not to be engaged: there a heartbeat closes the
+/// clutch.
+pub const OLDEST_ASKED: u16 = 2;
 /// Most bytes of a weights chunk: with its frame, less than half of a port's receive queue of 2,048 bytes.
 pub const CHUNK: usize = 512;
 /// Most axes of a gripper.
@@ -75,13 +81,14 @@ pub enum Call<'a> {
     ConfigurationGet,
     /// Refused while the clutch is closed. Kept until the next restart. Answer: [`Answer::Configuration`].
     ConfigurationSet(Configuration),
-    /// Closes the clutch for 250 ms: say it every 100 ms. Answer: [`Answer::Status`].
+    /// Closes the clutch: an act of a person. [`Call::Heartbeat`] keeps it closed. Answer: [`Answer::Engaged`].
     Engage,
-    /// Opens the clutch. Answer: [`Answer::Status`].
+    /// Opens the clutch. Always obeyed, from any host, without a session. Answer: [`Answer::Status`].
     Release,
     /// Activates the gripper: **it moves**. Answer: [`Answer::Done`].
     Activate,
-    /// Takes the next complete frame as the flat hand. Answer: [`Answer::Done`].
+    /// Takes the hand, flat and still for a second, as all joints at zero; [`Call::Health`] tells how it ended. Answer:
+    /// [`Answer::Done`].
     CalibrateFlatHand,
     /// [`FromBridge::Sample`] every so often from now on. Answer: [`Answer::Done`].
     Telemetry {
@@ -90,6 +97,15 @@ pub enum Call<'a> {
     },
     /// Restarts the bridge after the reply. Refused while the clutch is closed. Answer: [`Answer::Done`].
     Reboot,
+    /// Keeps the clutch closed for another 250 ms: say it every 100 ms. It closes nothing. Answer: [`Answer::Status`].
+    Heartbeat {
+        /// The epoch that [`Answer::Engaged`] gave.
+        epoch: Epoch,
+    },
+    /// Takes the calibration back that the newest one replaced. Answer: [`Answer::Done`].
+    CalibrateUndo,
+    /// Clutch, calibration, why the bridge started. Answer: [`Answer::Health`].
+    Health,
 }
 
 /// From the bridge.
@@ -119,7 +135,7 @@ pub enum Answer {
     Done,
     /// To hello.
     Hello(Hello),
-    /// To status, engage, release.
+    /// To status, release, heartbeat.
     Status(Status),
     /// To counters.
     Counters(Counters),
@@ -132,6 +148,15 @@ pub enum Answer {
     },
     /// To configuration get and set.
     Configuration(Configuration),
+    /// To engage.
+    Engaged {
+        /// What the clutch's heartbeats must carry.
+        epoch: Epoch,
+        /// What the bridge is doing.
+        status: Status,
+    },
+    /// To health.
+    Health(Health),
 }
 
 /// What the bridge is.
@@ -168,6 +193,33 @@ pub struct Status {
     pub active_slot: Option<u8>,
     /// Bytes there and bytes announced of an image under way.
     pub transfer: Option<(u32, u32)>,
+}
+
+/// What keeps a bridge from moving, beside its devices.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Health {
+    /// Where the clutch is.
+    pub clutch: Position,
+    /// Whether the glove is calibrated, and how the newest try ended.
+    pub calibration: CalibrationState,
+    /// Why the bridge started.
+    pub restart: Restart,
+    /// Stalls: more than 100 ms without a step of the supervisor.
+    pub stalls: u32,
+}
+
+/// Why a bridge started.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Restart {
+    /// The board cannot tell.
+    #[default]
+    Unknown,
+    /// Its power came, or its reset pin was pulled.
+    Power,
+    /// It was asked to ([`Call::Reboot`]), or a fault handler did.
+    Software,
+    /// The watchdog: the loop hung.
+    Watchdog,
 }
 
 /// What the gripper says.
@@ -384,6 +436,8 @@ pub enum Refusal {
         /// Least period, milliseconds.
         least_ms: u16,
     },
+    /// A heartbeat that keeps nothing closed.
+    Heartbeat(HeartbeatRefusal),
 }
 
 /// The names that [`Refusal::Configuration`] counts through.

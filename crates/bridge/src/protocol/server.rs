@@ -3,15 +3,16 @@
 use super::configuration::{self, per_axis};
 use super::frame::{Decoder, MAX_MESSAGE};
 use super::message::{
-    Answer, CHUNK, Call, Configuration, Counters, FromBridge, GripperStatus, Hello, Refusal, Reply,
-    Request, Sample, Status, VERSION,
+    Answer, CHUNK, Call, Configuration, Counters, FromBridge, GripperStatus, Health, Hello,
+    Refusal, Reply, Request, Restart, Sample, Status, VERSION,
 };
 use super::outgoing::Outgoing;
 use super::slow::{Reading, Slow};
 use crate::app::Controls;
+use crate::clutch::Position;
 use crate::store::WeightsStore;
 use crate::telemetry::bump;
-use crate::{Config, Duration, Instant, Slot};
+use crate::{Config, Duration, Instant, Slot, timing};
 use embedded_io::{Read, ReadReady, Write};
 
 /// A host that wrote or held the clutch and then said nothing for so long has lost its session.
@@ -37,6 +38,8 @@ pub struct Board {
     pub bytes_lost: [u32; 3],
     /// Most bytes of stack that were ever in use; 0 where nobody looks.
     pub stack_used: u32,
+    /// Why it started.
+    pub restart: Restart,
 }
 
 /// The bridge's end of one port.
@@ -50,8 +53,14 @@ pub struct Server<S> {
     /// CRC announced for the image under way, and by it the same image is known again.
     announced_crc: u32,
     reply: Outgoing,
-    /// Session and sequence of the request that `reply` answers: when it comes again, so does the reply.
+    /// Session and sequence of the request that `reply` answers: when it comes again, so does the reply. Older ones of the
+    /// same session that come late are not done any more.
     answered: Option<(u32, u16)>,
+    /// The newest request that came while a reply was on its way or a request was done in pieces.
+    pending: heapless::Vec<u8, MAX_MESSAGE>,
+    polled: Option<Instant>,
+    /// What lies in the port came while nobody polled: a heartbeat in it says nothing of now.
+    is_stale: bool,
     /// The request that is done in pieces, its session and sequence.
     slow: Option<(Slow, u32, u16)>,
     sample: Outgoing,
@@ -63,6 +72,8 @@ pub struct Server<S> {
 #[derive(Debug, Clone, Copy)]
 struct Session {
     id: u32,
+    /// Sequence of its newest request.
+    newest: u16,
     heard: Instant,
 }
 
@@ -84,12 +95,16 @@ impl<S: Read + ReadReady + Write> Server<S> {
             announced_crc: 0,
             reply: Outgoing::EMPTY,
             answered: None,
+            pending: heapless::Vec::new(),
+            polled: None,
+            is_stale: false,
             slow: None,
             sample: Outgoing::EMPTY,
             rebooting: false,
             board: Board {
                 bytes_lost: [0; 3],
                 stack_used: 0,
+                restart: Restart::Unknown,
             },
         }
     }
@@ -106,20 +121,27 @@ impl<S: Read + ReadReady + Write> Server<S> {
 
     /// Goes on with whatever is under way: sends, takes bytes, does at most one request or a piece of one. Never waits.
     ///
+    /// A release is obeyed at once, whatever else is under way. After more than 100 ms without a poll nothing else of what
+    /// lies in the port is done: hosts ask again.
+    ///
     /// Flash that is erased keeps the processor for as long as it takes: one sector a poll. The store refuses to be written
     /// while the clutch is closed.
     pub fn poll<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) -> Outcome {
-        if self.send() {
-            return Outcome::Continue;
-        }
-        if self.rebooting {
+        let before = self.polled.replace(now).unwrap_or(now);
+        self.is_stale |= !timing::is_within(now, before, timing::LONGEST_GAP);
+        let sending = self.send();
+        if self.rebooting && !sending {
             return Outcome::Reboot;
         }
         self.end_lease(now);
+        self.receive(app);
+        if sending {
+            return Outcome::Continue;
+        }
         if self.slow.is_some() {
             self.go_on(now, app);
         } else {
-            self.receive(now, app);
+            self.serve_pending(now, app);
         }
         if !self.reply.is_busy() {
             self.take_sample(now, app);
@@ -138,31 +160,60 @@ impl<S: Read + ReadReady + Write> Server<S> {
         first.send(&mut self.port) || second.send(&mut self.port)
     }
 
-    fn receive<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) {
-        // The message is copied out, so that the decoder is free while the request is done.
-        let mut message = [0; MAX_MESSAGE];
+    /// Takes bytes until a request is whole or none are left.
+    fn receive<A: Controls<X>, const X: usize>(&mut self, app: &mut A) {
         for _ in 0..BYTES_A_POLL {
-            if !matches!(self.port.read_ready(), Ok(true)) {
-                return;
-            }
             let mut byte = [0];
-            if !matches!(self.port.read(&mut byte), Ok(1)) {
+            let more = matches!(self.port.read_ready(), Ok(true));
+            if !more || !matches!(self.port.read(&mut byte), Ok(1)) {
+                if self.is_stale {
+                    // Of a frame that is half here the beginning is old.
+                    self.decoder.skip();
+                    self.is_stale = false;
+                }
                 return;
             }
-            let length = self.decoder.push(byte[0], |bytes| {
-                let length = bytes.len().min(MAX_MESSAGE);
-                if let (Some(to), Some(from)) = (message.get_mut(..length), bytes.get(..length)) {
-                    to.copy_from_slice(from);
-                }
-                length
+            let pending = &mut self.pending;
+            let whole = self.decoder.push(byte[0], |message| {
+                pending.clear();
+                // What is longer is no request: the decoder has counted it.
+                let _ = pending.extend_from_slice(message);
             });
-            let Some(message) = length.and_then(|length| message.get(..length)) else {
-                continue;
-            };
-            match postcard::from_bytes::<Request<'_>>(message) {
-                Ok(request) => return self.serve(now, &request, app),
-                Err(_) => bump(&mut self.malformed),
+            if whole.is_some() && self.is_wanted(app) {
+                return;
             }
+            if whole.is_some() {
+                self.pending.clear();
+            }
+        }
+    }
+
+    /// Whether the request that just came is to be served. A release has been obeyed when this returns.
+    fn is_wanted<A: Controls<X>, const X: usize>(&mut self, app: &mut A) -> bool {
+        match postcard::from_bytes::<Request<'_>>(&self.pending) {
+            Ok(Request {
+                call: Call::Release,
+                ..
+            }) => {
+                app.release();
+                true
+            }
+            Ok(_) => !self.is_stale,
+            Err(_) => {
+                bump(&mut self.malformed);
+                false
+            }
+        }
+    }
+
+    fn serve_pending<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) {
+        if self.pending.is_empty() {
+            return;
+        }
+        // Taken out, so that the rest of the server is free while the request is done.
+        let message = core::mem::take(&mut self.pending);
+        if let Ok(request) = postcard::from_bytes::<Request<'_>>(&message) {
+            self.serve(now, &request, app);
         }
     }
 
@@ -175,15 +226,26 @@ impl<S: Read + ReadReady + Write> Server<S> {
         let &Request {
             session, sequence, ..
         } = request;
-        let is_hello = matches!(request.call, Call::Hello { .. });
-        if self.answered == Some((session, sequence)) && !is_hello {
+        if self.answered == Some((session, sequence)) {
             // The reply was lost: the request was done already, and is not done twice.
             self.reply.again();
+            return;
+        }
+        if self.is_late(request) && !matches!(request.call, Call::Release) {
             return;
         }
         if let Some(answer) = self.answer(now, request, app) {
             self.reply(session, sequence, answer);
         }
+    }
+
+    /// A request that was overtaken by a younger one of its session: doing it now could close a clutch that was opened since.
+    fn is_late(&self, request: &Request<'_>) -> bool {
+        let is_hello = matches!(request.call, Call::Hello { .. });
+        self.session.is_some_and(|own| {
+            let ahead = request.sequence.wrapping_sub(own.newest);
+            own.id == request.session && (ahead > u16::MAX / 2 || (ahead == 0 && !is_hello))
+        })
     }
 
     fn reply(&mut self, session: u32, sequence: u16, answer: Result<Answer, Refusal>) {
@@ -217,10 +279,17 @@ impl<S: Read + ReadReady + Write> Server<S> {
         app: &mut A,
     ) -> Option<Result<Answer, Refusal>> {
         if let Call::Hello { version } = &request.call {
-            return Some(self.hello(now, request.session, *version, app));
+            return Some(self.hello(now, request, *version, app));
         }
         match &mut self.session {
-            Some(session) if session.id == request.session => session.heard = now,
+            Some(session) if session.id == request.session => {
+                session.heard = now;
+                session.newest = request.sequence;
+            }
+            // Obeyed when it came.
+            _ if matches!(request.call, Call::Release) => {
+                return Some(Ok(Answer::Status(status(app))));
+            }
             _ => return Some(Err(Refusal::NoSession)),
         }
         let slow = match &request.call {
@@ -258,26 +327,31 @@ impl<S: Read + ReadReady + Write> Server<S> {
             }
             Call::ConfigurationGet => Ok(Answer::Configuration(app.config().settings().into())),
             Call::ConfigurationSet(configuration) => configure(configuration, app),
-            Call::Engage => {
-                app.engage();
-                Ok(Answer::Status(status(app)))
-            }
-            Call::Release => {
-                app.release();
-                Ok(Answer::Status(status(app)))
-            }
+            Call::Engage => Ok(Answer::Engaged {
+                epoch: app.engage(),
+                status: status(app),
+            }),
+            Call::Heartbeat { epoch } => app
+                .heartbeat(*epoch)
+                .map(|()| Answer::Status(status(app)))
+                .map_err(Refusal::Heartbeat),
             Call::Activate => idle(app).map(|app| app.activate()).map(|()| Answer::Done),
             Call::CalibrateFlatHand => idle(app)
                 .map(|app| app.calibrate_flat_hand())
                 .map(|()| Answer::Done),
+            Call::CalibrateUndo => idle(app)
+                .map(|app| app.undo_calibration())
+                .map(|()| Answer::Done),
+            Call::Health => Ok(Answer::Health(self.health(app))),
             Call::Telemetry { period_ms } => self.set_telemetry(now, *period_ms),
             Call::Reboot => {
                 idle(app)?;
                 self.rebooting = true;
                 Ok(Answer::Done)
             }
-            // Hello and the slow ones were answered by the caller.
+            // Hello and the slow ones were answered by the caller, a release was obeyed when it came.
             Call::Status
+            | Call::Release
             | Call::Hello { .. }
             | Call::Slots
             | Call::WeightsCommit
@@ -288,10 +362,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
     fn hello<A: Controls<X>, const X: usize>(
         &mut self,
         now: Instant,
-        id: u32,
+        request: &Request<'_>,
         version: u16,
         app: &A,
     ) -> Result<Answer, Refusal> {
+        let id = request.session;
         if version != VERSION {
             return Err(Refusal::Version { bridge: VERSION });
         }
@@ -302,7 +377,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
             }
             _ => {}
         }
-        self.session = Some(Session { id, heard: now });
+        self.session = Some(Session {
+            id,
+            newest: request.sequence,
+            heard: now,
+        });
         self.telemetry = None;
         let expected = app.store().expected();
         let [inputs, hidden, outputs] = expected.shape;
@@ -393,6 +472,16 @@ impl<S: Read + ReadReady + Write> Server<S> {
         }));
     }
 
+    fn health<A: Controls<X>, const X: usize>(&self, app: &A) -> Health {
+        let seen = app.telemetry();
+        Health {
+            clutch: app.clutch(),
+            calibration: seen.calibration,
+            restart: self.board.restart,
+            stalls: seen.counters.stalls,
+        }
+    }
+
     fn counters<A: Controls<X>, const X: usize>(&self, app: &A) -> Counters {
         let seen = app.telemetry();
         let host = self.decoder.counters();
@@ -448,7 +537,7 @@ fn status<A: Controls<X>, const X: usize>(app: &A) -> Status {
         now_us: seen.now.as_ticks(),
         state: seen.state,
         engaged: app.is_engaged(),
-        heartbeat: app.heartbeat_comes(),
+        heartbeat: app.clutch() == Position::Closed,
         glove_answers: seen.glove_answers,
         gripper: seen
             .status

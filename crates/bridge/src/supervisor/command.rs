@@ -107,7 +107,8 @@ impl<const X: usize> Supervisor<X> {
         });
         let rounded =
             core::array::from_fn(|axis| limits::round(wanted[axis], status.position[axis]));
-        let command = limits::keep_inside(rounded, &status.position, desired);
+        let ceiling = self.underway.ceiling(status);
+        let command = limits::keep_inside(rounded, &ceiling, &status.position, desired);
         let motion = self.command(command);
         for axis in 0..X {
             if command[axis] == rounded[axis] {

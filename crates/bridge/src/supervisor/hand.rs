@@ -72,7 +72,7 @@ impl<const X: usize> Follower<X> {
     }
 
     fn use_frame(&mut self, now: Instant, stamp: Instant, output: [f32; X]) {
-        if !is_fresh(now, stamp) {
+        if !timing::is_fresh(now, stamp) {
             self.run = 0;
             return;
         }
@@ -109,7 +109,7 @@ impl<const X: usize> Follower<X> {
             return Err(reason);
         }
         match self.used {
-            Some(used) if is_fresh(now, used.stamp) => {
+            Some(used) if timing::is_fresh(now, used.stamp) => {
                 if self.run >= wanted {
                     Ok(used)
                 } else {
@@ -127,12 +127,6 @@ impl<const X: usize> Follower<X> {
     pub fn target(&self) -> Option<[f32; X]> {
         self.used.map(|used| used.target)
     }
-}
-
-/// Whether something stamped `stamp` may still be used. A stamp in the future is a fault of a clock: not fresh.
-pub(super) fn is_fresh(now: Instant, stamp: Instant) -> bool {
-    now.checked_duration_since(stamp)
-        .is_some_and(|age| age <= timing::MAX_AGE)
 }
 
 /// A lost sensor may be one bad read: the last frame serves until it is too old. What the map refuses is no such thing.

@@ -3,14 +3,16 @@
 //! The configuration space of the 3-Finger gripper is not convex: it forbids a scissor that is far closed *while* two
 //! fingers are far closed. Each of two commands may be allowed and the way between them not, and the axes are not
 //! equally fast. But what is forbidden stays forbidden when any axis closes further (the allowed set is a lower set). So
-//! it is enough that the *corner*, axis by axis the greater of command and measured position, is allowed: then every
-//! position the gripper can be in on its way is allowed too, in whatever order its axes arrive.
+//! it is enough that the *corner*, axis by axis the greatest of the command, the measured position and the commands whose
+//! effect the measurement does not show yet, is allowed: then every position the gripper can be in on its way is allowed
+//! too, in whatever order its axes arrive.
 
+use super::underway::greater;
 use gripper::{Contact, space};
 
-/// Distance kept from the edge of the configuration space, in counts, so that a measured position that ends a count
-/// beyond its command is still inside.
-const MARGIN: f32 = 2.0;
+/// Distance kept from the edge of the configuration space, in counts, by every axis: one that ends a count or two beyond
+/// its command is still inside.
+const MARGIN: u8 = 2;
 
 /// Whether an axis has stopped against something (gDTx 1 or 2).
 pub fn touches(contact: Contact) -> bool {
@@ -18,19 +20,21 @@ pub fn touches(contact: Contact) -> bool {
 }
 
 /// The nearest allowed position to `target`: within 0 to 255, and for four axes inside the configuration space with
-/// a margin of two counts. `target` must be finite.
+/// a margin of two and a half counts. `target` must be finite.
 pub fn project<const X: usize>(target: [f32; X]) -> [f32; X] {
     let boxed = target.map(|x| limit(x, 0.0, 255.0));
     let Some(four) = four(&boxed) else {
         return boxed;
     };
-    let shifted = four.map(|x| (x + MARGIN).min(255.0));
+    // Half a count more, so that a target that is rounded to counts still keeps the margin.
+    let margin = f32::from(MARGIN) + 0.5;
+    let shifted = four.map(|x| (x + margin).min(255.0));
     if space::contains(&shifted) {
         return boxed;
     }
     let near = space::nearest(&shifted);
     from_four(
-        core::array::from_fn(|axis| limit(near[axis] - MARGIN, 0.0, 255.0)),
+        core::array::from_fn(|axis| limit(near[axis] - margin, 0.0, 255.0)),
         boxed,
     )
 }
@@ -72,44 +76,43 @@ pub fn inside<const X: usize>(position: &[u8; X]) -> bool {
     }
 }
 
-/// `command`, changed where needed so that the gripper stays inside the configuration space on its way from `measured`,
-/// in whatever order its axes arrive. Axes only ever move towards `measured`, so a lead that was kept stays kept.
+/// Whether a position is allowed with the margin on every axis.
+fn well_inside<const X: usize>(position: &[u8; X]) -> bool {
+    inside(&position.map(|x| x.saturating_add(MARGIN)))
+}
+
+/// `command`, changed where needed so that the gripper stays inside the configuration space on its way, in whatever order
+/// its axes arrive. `ceiling` is, axis by axis, the farthest closed it can be by now ([`super::underway`]); `measured`, at
+/// most that, is where it was last seen. Axes only ever move towards `measured`, so a lead that was kept stays kept.
 ///
-/// A gripper that is outside (someone put it there) may only open, axis by axis, until it is inside.
+/// A gripper that may be outside, or within the margin of the edge, may only open, axis by axis, until it is not.
 pub fn keep_inside<const X: usize>(
     command: [u8; X],
+    ceiling: &[u8; X],
     measured: &[u8; X],
     target: &[f32; X],
 ) -> [u8; X] {
-    if inside(&corner(&command, measured)) {
+    if well_inside(&greater(&command, ceiling)) {
         return command;
     }
-    if !inside(measured) {
+    if !well_inside(ceiling) {
         return core::array::from_fn(|axis| command[axis].min(measured[axis]));
     }
-    match (
-        cap_scissor(command, measured),
-        cap_fingers(command, measured),
-    ) {
+    match (cap_scissor(command, ceiling), cap_fingers(command, ceiling)) {
         (Some(a), Some(b)) if distance(&b, target) < distance(&a, target) => b,
         (Some(a), _) => a,
         (None, Some(b)) => b,
-        (None, None) => *measured,
+        (None, None) => core::array::from_fn(|axis| command[axis].min(ceiling[axis])),
     }
 }
 
-/// Axis by axis the greater one.
-fn corner<const X: usize>(a: &[u8; X], b: &[u8; X]) -> [u8; X] {
-    core::array::from_fn(|axis| a[axis].max(b[axis]))
-}
-
 /// Lets the scissor, the last axis, close only as far as the fingers' corner allows.
-fn cap_scissor<const X: usize>(mut command: [u8; X], measured: &[u8; X]) -> Option<[u8; X]> {
+fn cap_scissor<const X: usize>(mut command: [u8; X], ceiling: &[u8; X]) -> Option<[u8; X]> {
     let last = X.checked_sub(1)?;
-    let (wanted, here) = (command[last], measured[last]);
+    let (wanted, here) = (command[last], ceiling[last]);
     for scissor in (here..wanted).rev() {
         command[last] = scissor;
-        if inside(&corner(&command, measured)) {
+        if well_inside(&greater(&command, ceiling)) {
             return Some(command);
         }
     }
@@ -117,18 +120,18 @@ fn cap_scissor<const X: usize>(mut command: [u8; X], measured: &[u8; X]) -> Opti
 }
 
 /// Lets the fingers close only as far as the scissor's corner allows, all by the same share of their way.
-fn cap_fingers<const X: usize>(command: [u8; X], measured: &[u8; X]) -> Option<[u8; X]> {
+fn cap_fingers<const X: usize>(command: [u8; X], ceiling: &[u8; X]) -> Option<[u8; X]> {
     const PARTS: u16 = 40;
     (0..PARTS).rev().find_map(|part| {
         let mut capped = command;
         for axis in 0..X.saturating_sub(1) {
-            let rise = u16::from(command[axis].saturating_sub(measured[axis]));
+            let rise = u16::from(command[axis].saturating_sub(ceiling[axis]));
             if rise > 0 {
                 // At most `rise`, which is at most 255.
-                capped[axis] = measured[axis].saturating_add((rise * part / PARTS) as u8);
+                capped[axis] = ceiling[axis].saturating_add((rise * part / PARTS) as u8);
             }
         }
-        inside(&corner(&capped, measured)).then_some(capped)
+        well_inside(&greater(&capped, ceiling)).then_some(capped)
     })
 }
 

@@ -3,19 +3,24 @@
 //! [`Supervisor::step`] takes the time and everything it needs as arguments, does no I/O and reads no clock: the same
 //! inputs give the same commands on every machine. `docs/safety.md` says which rule it keeps, where and how it is tested.
 
+mod believed;
 mod command;
 mod hand;
 pub mod limits;
 pub mod state;
+mod underway;
 
 pub use hand::Hand;
-pub use state::{Clutch, Conditions, GripperFault, HoldReason, State};
+pub use state::{Conditions, GripperFault, HoldReason, State};
 
+use crate::clutch::Clutch;
 use crate::config::Config;
 use crate::{Duration, Instant, timing};
+use believed::Believed;
 use gripper::registers::Fault;
 use gripper::{Activation, Motion, Status};
-use hand::{Follower, Used, is_fresh};
+use hand::{Follower, Used};
+use underway::Underway;
 
 /// Whether there is a map to follow.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -31,8 +36,8 @@ pub enum Weights {
 /// Everything a step looks at.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Inputs<const X: usize> {
-    /// When the clutch's newest heartbeat came; `None` when the person opened the clutch or never closed it.
-    pub heartbeat: Option<Instant>,
+    /// The clutch.
+    pub clutch: Clutch,
     /// The newest frame; the same one may be given again.
     pub hand: Option<Hand<X>>,
     /// The gripper's newest status; the same one may be given again.
@@ -54,7 +59,9 @@ pub struct Output<const X: usize> {
     pub stamp: Instant,
     /// Where the hand wants the gripper, counts: filtered, inside the configuration space.
     pub target: Option<[f32; X]>,
-    /// How much later than its period the step came, when that is more than 2 ms.
+    /// This axis stands still although it has been told to move for 1.5 s, and says nothing of an obstacle.
+    pub stands: Option<u8>,
+    /// How much later than its period the step came, when that is more than 2 ms. A stall is told here too.
     pub late: Option<Duration>,
 }
 
@@ -75,8 +82,23 @@ pub struct Supervisor<const X: usize> {
     moved: bool,
     held_since: Option<Instant>,
     blend: Blend<X>,
+    underway: Underway<X>,
+    believed: Believed<X>,
     was_ready: bool,
+    /// What the gripper echoes is not what it is told.
+    ignored: bool,
     ignored_since: Option<Instant>,
+}
+
+/// What the gripper says, as far as it decides the next state.
+#[derive(Debug, Clone, Copy)]
+struct Said<const X: usize> {
+    /// Its newest status, while that is fresh.
+    status: Option<Status<X>>,
+    /// This axis says, again and again, that it is where it cannot be.
+    implausible: Option<u8>,
+    /// There are positions that can be true, and they are fresh.
+    believed: bool,
 }
 
 /// How a command moves.
@@ -110,7 +132,10 @@ impl<const X: usize> Supervisor<X> {
                 from: [0.0; X],
                 since: Instant::from_ticks(0),
             },
+            underway: Underway::new(),
+            believed: Believed::new(),
             was_ready: false,
+            ignored: false,
             ignored_since: None,
         }
     }
@@ -134,41 +159,57 @@ impl<const X: usize> Supervisor<X> {
 
     /// One step. Call it every 10 ms, and whenever a new frame should be answered at once.
     pub fn step(&mut self, now: Instant, inputs: &Inputs<X>) -> Output<X> {
-        let gap = self.elapse(now);
+        let elapsed = self.elapse(now);
+        let gap = elapsed.filter(|gap| *gap <= timing::LONGEST_GAP);
         if gap.is_none() {
             self.follower.forget();
         }
         if let Some(hand) = &inputs.hand {
             self.follower.accept(now, hand);
         }
-        let status = inputs.status.filter(|status| is_fresh(now, status.stamp));
-        let (conditions, used) = self.conditions(now, inputs, status.as_ref(), gap.is_none());
+        let fresh = |status: &Status<X>| timing::is_fresh(now, status.stamp);
+        let said = inputs.status.filter(fresh);
+        let judged = said.map(|status| self.believed.take(now, &status));
+        let status = judged.and_then(|judged| judged.status).filter(fresh);
+        let implausible = judged.and_then(|judged| judged.implausible);
+        let gripper = Said {
+            status: said,
+            implausible,
+            believed: status.is_some(),
+        };
+        let (conditions, used) = self.conditions(now, inputs, &gripper, gap.is_none());
         let before = self.state;
         self.state = state::next(before, &conditions);
         self.enter(now, before, status.as_ref());
+        if self.state == State::Idle && implausible.is_some() {
+            self.believed.forget();
+        }
         let (motion, stamp) = self.motion(
             now,
             gap.unwrap_or(Duration::from_ticks(0)),
             status.as_ref(),
             used,
         );
+        if let Some(motion) = &motion {
+            self.underway.decided(now, motion.position);
+        }
         Output {
             state: self.state,
             before,
             motion,
             stamp,
             target: self.follower.target(),
-            late: gap.and_then(lateness),
+            stands: self.stands(now, status.as_ref(), motion.as_ref()),
+            late: elapsed.and_then(lateness),
         }
     }
 }
 
 impl<const X: usize> Supervisor<X> {
-    /// Time since the step before: `None` when it cannot be taken as one stretch (a stall, or a clock that ran backwards).
+    /// Time since the step before; `None` when the clock ran backwards.
     fn elapse(&mut self, now: Instant) -> Option<Duration> {
         let before = self.stepped.replace(now).unwrap_or(now);
         now.checked_duration_since(before)
-            .filter(|gap| *gap <= timing::LONGEST_GAP)
     }
 
     /// Everything that decides the next state, and the frame to follow if there is one.
@@ -176,18 +217,20 @@ impl<const X: usize> Supervisor<X> {
         &mut self,
         now: Instant,
         inputs: &Inputs<X>,
-        status: Option<&Status<X>>,
+        said: &Said<X>,
         stalled: bool,
     ) -> (Conditions, Option<Used<X>>) {
-        let fault = self.gripper_fault(now, status);
+        let fault = self.gripper_fault(now, said);
         let wanted = if self.state.is_moving() {
             0
         } else {
             self.config.settings().fresh_frames
         };
         let follow = self.follower.follow(now, wanted);
-        let gripper = match status.map(|status| status.activation) {
+        let gripper = match said.status.map(|status| status.activation) {
             None => Some(HoldReason::GripperSilent),
+            // Until a second status agrees with the first nobody knows where it is.
+            Some(Activation::Ready) if !said.believed => Some(HoldReason::GripperSilent),
             Some(Activation::Ready) => None,
             Some(other) => Some(HoldReason::GripperNotReady(other)),
         };
@@ -198,7 +241,7 @@ impl<const X: usize> Supervisor<X> {
         };
         let stall = stalled.then_some(HoldReason::ClockGap);
         let conditions = Conditions {
-            clutch: clutch(now, inputs.heartbeat),
+            clutch: inputs.clutch.position(now),
             fault,
             obstacle: gripper.or(stall).or(weights).or(follow.err()),
             blended: since(now, self.blend.since) >= self.blend_time(),
@@ -211,8 +254,8 @@ impl<const X: usize> Supervisor<X> {
     }
 
     /// A fault of the gripper at this moment. Whether it *lost* its activation is judged from the clutch's closing on.
-    fn gripper_fault(&mut self, now: Instant, status: Option<&Status<X>>) -> Option<GripperFault> {
-        let status = status?;
+    fn gripper_fault(&mut self, now: Instant, said: &Said<X>) -> Option<GripperFault> {
+        let status = said.status?;
         let ready = status.activation == Activation::Ready;
         self.was_ready = ready || (self.was_ready && self.state != State::Idle);
         if !self.state.is_moving() || status.going_to {
@@ -227,12 +270,30 @@ impl<const X: usize> Supervisor<X> {
             )
         {
             Some(GripperFault::ActivationLost(status.activation))
+        } else if let Some(axis) = said.implausible {
+            Some(GripperFault::Implausible { axis })
         } else if self.state.is_moving() && !status.going_to {
             let start = *self.ignored_since.get_or_insert(now);
             (since(now, start) >= timing::IGNORED_AFTER).then_some(GripperFault::CommandIgnored)
         } else {
-            None
+            self.ignored.then_some(GripperFault::CommandIgnored)
         }
+    }
+
+    /// Looks whether the gripper does what it is told: the axis that stands, and for the next step whether it echoes.
+    fn stands(
+        &mut self,
+        now: Instant,
+        status: Option<&Status<X>>,
+        motion: Option<&Motion<X>>,
+    ) -> Option<u8> {
+        self.ignored = false;
+        let (Some(status), Some(motion), true) = (status, motion, self.state.is_moving()) else {
+            self.believed.rest();
+            return None;
+        };
+        self.ignored = self.believed.ignores(now, status, motion);
+        self.believed.stands(now, status, motion)
     }
 
     /// What a change of state sets up.
@@ -273,17 +334,6 @@ impl<const X: usize> Supervisor<X> {
 
     fn blend_time(&self) -> Duration {
         Duration::from_ticks(1_000 * u64::from(self.config.settings().blend_ms))
-    }
-}
-
-/// The clutch by its heartbeat. A heartbeat from the future is none.
-fn clutch(now: Instant, heartbeat: Option<Instant>) -> Clutch {
-    match heartbeat {
-        None => Clutch::Open,
-        Some(beat) => match now.checked_duration_since(beat) {
-            Some(age) if age < timing::HEARTBEAT_TIMEOUT => Clutch::Closed,
-            _ => Clutch::Lost,
-        },
     }
 }
 

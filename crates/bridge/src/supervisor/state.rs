@@ -2,6 +2,7 @@
 //!
 //! `docs/safety.md` draws the same table; [`next`] is the only place where a state changes.
 
+use crate::clutch::Position;
 use gripper::{Activation, registers::Fault};
 
 /// What the bridge is doing.
@@ -9,7 +10,7 @@ use gripper::{Activation, registers::Fault};
 pub enum State {
     /// The clutch is open. Before the first motion nothing is written to the gripper, after it the hold is repeated.
     Idle,
-    /// The clutch is closed and something forbids motion: the gripper is held where it is.
+    /// Something forbids motion, or the clutch opened by itself: the gripper is held where it is.
     Holding(HoldReason),
     /// Motion has been held for 500 ms for want of data or heartbeat: the configured safe action runs.
     SafeAction(HoldReason),
@@ -17,7 +18,7 @@ pub enum State {
     Blending,
     /// The gripper follows the hand.
     Following,
-    /// The gripper has a fault. Stays until the clutch is opened.
+    /// The gripper has a fault. Stays, heartbeat or none, until somebody opens the clutch.
     Faulted(GripperFault),
 }
 
@@ -46,6 +47,8 @@ pub enum HoldReason {
     GripperNotReady(Activation),
     /// No step for more than 100 ms, or the clock ran backwards.
     ClockGap,
+    /// The glove was not calibrated, or its calibration is worth nothing any more.
+    NotCalibrated,
 }
 
 /// A fault of the gripper that ends motion until the clutch is opened.
@@ -55,8 +58,14 @@ pub enum GripperFault {
     Reported(Fault),
     /// It was ready, and has lost its activation.
     ActivationLost(Activation),
-    /// It has answered commands for 500 ms and does not go to them (gGTO stays 0).
+    /// It answers commands and does not go to them: gGTO stays 0 for 500 ms, or what it echoes is not what it was told
+    /// for 1 s.
     CommandIgnored,
+    /// What it says of where it is cannot be: an axis jumped farther than it can move, several times in a row.
+    Implausible {
+        /// The axis.
+        axis: u8,
+    },
 }
 
 impl HoldReason {
@@ -107,6 +116,9 @@ impl core::fmt::Display for HoldReason {
             HoldReason::Settling => "waiting for enough fresh frames in a row",
             HoldReason::SamplesStale => "no fresh samples from the glove",
             HoldReason::SensorsLost(mask) => return sensors(*mask, f),
+            HoldReason::NotCalibrated => {
+                "the glove is not calibrated: open the clutch, lay the hand flat, calibrate"
+            }
             HoldReason::NoWeights => "no weights: flash an image",
             HoldReason::StoreBusy => "a weights image is being written",
             HoldReason::InputRefused => "the map refused the joint angles",
@@ -137,27 +149,21 @@ impl core::fmt::Display for GripperFault {
             GripperFault::ActivationLost(_) => {
                 f.write_str("the gripper lost its activation: activate it again")
             }
+            GripperFault::Implausible { axis } => write!(
+                f,
+                "the gripper says that {} jumped farther than it can move",
+                crate::telemetry::axis_name(*axis)
+            ),
             GripperFault::CommandIgnored => f.write_str("the gripper does not go to its commands"),
         }
     }
-}
-
-/// The clutch, as its heartbeat says.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Clutch {
-    /// Opened by the person, or never closed.
-    Open,
-    /// Open because the heartbeat stopped.
-    Lost,
-    /// Closed.
-    Closed,
 }
 
 /// All that decides the next state.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Conditions {
     /// The clutch.
-    pub clutch: Clutch,
+    pub clutch: Position,
     /// A fault of the gripper at this moment.
     pub fault: Option<GripperFault>,
     /// What forbids motion at this moment.
@@ -170,19 +176,20 @@ pub struct Conditions {
 
 /// The transition table.
 pub fn next(state: State, c: &Conditions) -> State {
-    match (c.clutch, state) {
-        (Clutch::Open, _) | (Clutch::Lost, State::Idle | State::Faulted(_)) => State::Idle,
-        (Clutch::Lost, _) => hold(
+    match (c.clutch, state, c.fault) {
+        (Position::Open, ..) => State::Idle,
+        (_, State::Faulted(old), fault) => State::Faulted(fault.unwrap_or(old)),
+        (Position::Lost | Position::Expired, State::Idle, _) => State::Idle,
+        (_, _, Some(fault)) => State::Faulted(fault),
+        (Position::Lost | Position::Expired, ..) => hold(
             c,
             c.obstacle
                 .filter(|r| !r.leads_to_safe_action())
                 .unwrap_or(HoldReason::HeartbeatLost),
         ),
-        (Clutch::Closed, State::Faulted(old)) => State::Faulted(c.fault.unwrap_or(old)),
-        (Clutch::Closed, _) => match (c.fault, c.obstacle) {
-            (Some(fault), _) => State::Faulted(fault),
-            (None, Some(reason)) => hold(c, reason),
-            (None, None) => advance(state, c),
+        (Position::Closed, ..) => match c.obstacle {
+            Some(reason) => hold(c, reason),
+            None => advance(state, c),
         },
     }
 }
@@ -225,28 +232,32 @@ mod tests {
     /// The table of docs/safety.md, row by row, first row that fits.
     fn table(from: State, c: &Conditions) -> State {
         let gripper = c.obstacle == Some(SILENT);
+        let unattended = matches!(c.clutch, Position::Lost | Position::Expired);
         match (c.clutch, from, c.fault, c.obstacle) {
-            (Clutch::Open, ..) => State::Idle,
-            (Clutch::Lost, State::Idle | State::Faulted(_), ..) => State::Idle,
-            (Clutch::Lost, _, _, Some(SILENT)) => State::Holding(SILENT),
-            (Clutch::Lost, ..) if c.held_long => State::SafeAction(HoldReason::HeartbeatLost),
-            (Clutch::Lost, ..) => State::Holding(HoldReason::HeartbeatLost),
-            (Clutch::Closed, State::Faulted(old), new, _) => State::Faulted(new.unwrap_or(old)),
-            (Clutch::Closed, _, Some(fault), _) => State::Faulted(fault),
-            (Clutch::Closed, _, _, Some(obstacle)) if c.held_long && !gripper => {
-                State::SafeAction(obstacle)
-            }
-            (Clutch::Closed, _, _, Some(obstacle)) => State::Holding(obstacle),
-            (Clutch::Closed, State::Following, ..) => State::Following,
-            (Clutch::Closed, State::Blending, ..) if c.blended => State::Following,
-            (Clutch::Closed, ..) => State::Blending,
+            (Position::Open, ..) => State::Idle,
+            (_, State::Faulted(old), new, _) => State::Faulted(new.unwrap_or(old)),
+            (_, State::Idle, ..) if unattended => State::Idle,
+            (_, _, Some(fault), _) => State::Faulted(fault),
+            (_, _, _, Some(SILENT)) => State::Holding(SILENT),
+            _ if unattended && c.held_long => State::SafeAction(HoldReason::HeartbeatLost),
+            _ if unattended => State::Holding(HoldReason::HeartbeatLost),
+            (_, _, _, Some(obstacle)) if c.held_long && !gripper => State::SafeAction(obstacle),
+            (_, _, _, Some(obstacle)) => State::Holding(obstacle),
+            (_, State::Following, ..) => State::Following,
+            (_, State::Blending, ..) if c.blended => State::Following,
+            _ => State::Blending,
         }
     }
 
     #[test]
     fn every_transition_is_the_one_of_the_documented_table() {
         for from in STATES {
-            for clutch in [Clutch::Open, Clutch::Lost, Clutch::Closed] {
+            for clutch in [
+                Position::Open,
+                Position::Lost,
+                Position::Expired,
+                Position::Closed,
+            ] {
                 for fault in [None, Some(FAULT)] {
                     for obstacle in [None, Some(STALE), Some(SILENT)] {
                         for (blended, held_long) in

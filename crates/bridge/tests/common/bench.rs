@@ -3,7 +3,7 @@
 use super::{FIST, Flash, hand_image};
 use bridge::app::expected;
 use bridge::event::{Event, Kind};
-use bridge::{App, Config, Instant, Platform, Settings, State, WeightsStore};
+use bridge::{App, Config, Epoch, Instant, Platform, Settings, State, WeightsStore};
 use gripper::driver::ThreeFinger;
 use rig::flash::Power;
 use rig::glove::VirtualGlove;
@@ -43,7 +43,10 @@ pub struct Bench {
     pub app: Loop,
     /// The person's hand on the clutch.
     pub clutch: bool,
+    /// No heartbeat comes, and nobody touches the clutch: the test does.
+    pub silent: bool,
     pub events: Vec<Event>,
+    epoch: Option<Epoch>,
     beat: u64,
 }
 
@@ -95,7 +98,9 @@ impl Bench {
             pose,
             app,
             clutch: false,
+            silent: false,
             events: Vec::new(),
+            epoch: None,
             beat: 0,
         }
     }
@@ -110,8 +115,16 @@ impl Bench {
 
     /// One step of the loop and the wait after it.
     pub fn step(&mut self) {
-        if self.clutch && self.now() >= self.beat {
-            self.app.engage();
+        if !self.clutch {
+            self.epoch = None;
+        } else if self.silent {
+            // The test holds the clutch itself.
+        } else if self.now() >= self.beat || self.epoch.is_none() {
+            match self.epoch {
+                None => self.epoch = Some(self.app.engage()),
+                // A clutch that opened by itself stays open: the test says when a person closes it again.
+                Some(epoch) => drop(self.app.heartbeat(epoch)),
+            }
             self.beat = self.now() + 100 * MS;
         }
         let due = self.app.step();
@@ -146,8 +159,10 @@ impl Bench {
         self.app.telemetry().state
     }
 
-    /// Both devices answer, the gripper is activated.
+    /// Both devices answer, the glove is calibrated as sensors are that sit straight, the gripper is activated.
     pub fn ready(&mut self) {
+        self.app
+            .set_calibration(glove::hand::Calibration::identity());
         self.app.activate();
         self.until("ready", |bench| {
             let telemetry = bench.app.telemetry();
@@ -156,6 +171,8 @@ impl Bench {
                 .is_some_and(|status| status.activation == gripper::Activation::Ready);
             activated && telemetry.frame_sequence > 0
         });
+        self.events
+            .retain(|event| !matches!(event.kind, Kind::Calibration(_)));
     }
 
     pub fn follow(&mut self) {

@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 pub mod bench;
+pub mod host;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};

@@ -5,7 +5,8 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::protocol::message::Status;
+use bridge::calibration::{Refusal, Try};
+use bridge::protocol::message::{Health, Restart, Status};
 use gripper::Activation;
 use serde_json::json;
 
@@ -13,8 +14,9 @@ use super::flash::slot_lines;
 use crate::chip::{Options, Watch, standing_faults, write_head, write_row};
 use crate::cli::{Bridge, BridgeAt, BridgeVerb};
 use crate::failure::{Failure, OrFail};
-use crate::host_link::HostLink;
+use crate::host_link::{Error, HostLink};
 use crate::interrupt::Interrupt;
+use crate::run::calibrating;
 use crate::tell::Tell;
 use crate::{out, words};
 
@@ -33,9 +35,11 @@ pub(super) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
         BridgeVerb::Status { at } => status(at),
         BridgeVerb::Engage {
             at,
+            calibrate_flat,
             activate,
             seconds,
-        } => engage(at, *activate, *seconds, interrupt),
+        } => engage(at, *calibrate_flat, *activate, *seconds, interrupt),
+        BridgeVerb::Calibrate { at, undo } => calibrate(at, *undo, interrupt),
         BridgeVerb::Release { at } => release(at),
         BridgeVerb::Monitor { at, seconds } => monitor(at, *seconds, interrupt),
         BridgeVerb::Log { at, out, seconds } => log(at, out, *seconds, interrupt),
@@ -54,9 +58,14 @@ fn status(at: &BridgeAt) -> Result<()> {
     let status = link.status().map_err(Failure::from)?;
     let slots = link.slots().map_err(Failure::from)?;
     let counters = link.counters().map_err(Failure::from)?;
+    // A bridge of version 2 has none.
+    let health = match link.health() {
+        Err(Error::Older { .. }) => None,
+        health => Some(health.map_err(Failure::from)?),
+    };
     if at.json {
         return out::json(&json!({
-            "hello": hello, "status": status, "slots": slots, "counters": counters,
+            "hello": hello, "status": status, "slots": slots, "counters": counters, "health": health,
         }));
     }
     let tell = Tell::new(false);
@@ -76,6 +85,11 @@ fn status(at: &BridgeAt) -> Result<()> {
     ));
     for fault in standing_faults(&status) {
         tell.say(format_args!("fault      {fault}"));
+    }
+    if let Some(health) = &health {
+        health_lines(health)
+            .iter()
+            .for_each(|line| tell.say(format_args!("{line}")));
     }
     if let Some(gripper) = &status.gripper {
         tell.say(format_args!(
@@ -109,6 +123,24 @@ fn status(at: &BridgeAt) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+fn health_lines(health: &Health) -> Vec<String> {
+    let calibration = match (health.calibration.is_calibrated, health.calibration.newest) {
+        (true, _) => "calibrated".to_owned(),
+        (false, Try::Refused(why)) => format!("not calibrated: {why}"),
+        (false, _) => "not calibrated: `gauntlet bridge calibrate` does it".to_owned(),
+    };
+    let restart = match health.restart {
+        Restart::Unknown => "for a reason the board cannot tell",
+        Restart::Power => "by power or its reset pin",
+        Restart::Software => "by request, or after a fault of its own",
+        Restart::Watchdog => "by its watchdog: its loop hung",
+    };
+    vec![
+        format!("glove      {calibration}"),
+        format!("started    {restart}; {} stalls since", health.stalls),
+    ]
 }
 
 /// How the clutch is. A host that vanished leaves a hold, which keeps the bridge from other work until it is released.
@@ -148,12 +180,16 @@ fn release(at: &BridgeAt) -> Result<()> {
 
 fn engage(
     at: &BridgeAt,
+    calibrate: bool,
     activate: bool,
     seconds: Option<Duration>,
     interrupt: &Interrupt,
 ) -> Result<()> {
     let tell = Tell::new(at.json);
     let mut link = connect(at)?;
+    if calibrate && !calibrated(&mut link, &tell, interrupt)? {
+        return Ok(());
+    }
     if activate && !activated(&mut link, &tell, interrupt)? {
         return Ok(());
     }
@@ -163,9 +199,66 @@ fn engage(
         engage: true,
         quiet: at.json,
     };
-    let (summary, _) = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
-    tell.say(format_args!("the clutch is open, the gripper is held"));
-    finish(at, &tell, &summary)
+    let watched = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
+    if let Some(stopped) = watched.stopped {
+        tell.say(format_args!("the clutch is open: {}", stopped.judge()?));
+    }
+    finish(at, &tell, &watched.summary)?;
+    watched.attended()
+}
+
+fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(at.json);
+    let mut link = connect(at)?;
+    if undo {
+        link.undo_calibration().map_err(Failure::from)?;
+        tell.say(format_args!("the newest calibration was taken back"));
+    } else if !calibrated(&mut link, &tell, interrupt)? {
+        return Ok(());
+    }
+    if at.json {
+        return out::json(&link.health().map_err(Failure::from)?.calibration);
+    }
+    Ok(())
+}
+
+/// Takes the hand as flat once it has been still, as often as it takes within [`calibrating::WAIT`]. Returns whether to go on.
+pub(super) fn calibrated(link: &mut HostLink, tell: &Tell, interrupt: &Interrupt) -> Result<bool> {
+    tell.say(format_args!("{}", calibrating::ASK));
+    let end = Instant::now() + calibrating::WAIT;
+    loop {
+        let before = link.health().map_err(Failure::from)?.calibration.ended;
+        link.calibrate_flat_hand().map_err(Failure::from)?;
+        let newest = loop {
+            let state = link.health().map_err(Failure::from)?.calibration;
+            if state.ended != before {
+                break state.newest;
+            }
+            if interrupt.sleep(PAUSE) {
+                return Ok(false);
+            }
+            if Instant::now() >= end {
+                break Try::Waiting;
+            }
+        };
+        match newest {
+            Try::Refused(why) if Instant::now() >= end || why == Refusal::Engaged => {
+                return Err(calibrating::refused(why).into());
+            }
+            Try::Refused(_) => {}
+            Try::Taken => {
+                tell.say(format_args!("{}", calibrating::DONE));
+                return Ok(true);
+            }
+            Try::None | Try::Waiting | Try::Undone => {
+                return Err(Failure::new(
+                    "the bridge did not say how the calibration ended",
+                    "`gauntlet bridge status`, which says whether it is calibrated; then the same again",
+                )
+                .into());
+            }
+        }
+    }
 }
 
 /// Activates the gripper where it is not, and waits. Returns whether to go on.
@@ -209,8 +302,8 @@ fn monitor(at: &BridgeAt, seconds: Option<Duration>, interrupt: &Interrupt) -> R
         engage: false,
         quiet: at.json,
     };
-    let (summary, _) = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
-    finish(at, &tell, &summary)
+    let watched = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
+    finish(at, &tell, &watched.summary)
 }
 
 fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interrupt) -> Result<()> {
@@ -239,11 +332,16 @@ fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interr
         rows += 1;
         write_row(&mut file, sample)
     });
-    file.into_inner()
+    let written = file
+        .into_inner()
         .map_err(|error| error.into_error())
-        .and_then(|file| file.sync_all())
-        .or_fail(name, "room on the disk")?;
-    let (summary, _) = watched?;
+        .and_then(|file| file.sync_all());
+    if watched.is_err() && rows == 0 {
+        // An empty file would stand in the way of the same command again.
+        let _ = std::fs::remove_file(path);
+    }
+    written.or_fail(name, "room on the disk")?;
+    let summary = watched?.summary;
     tell.say(format_args!(
         "log        {} with {rows} poses",
         path.display()

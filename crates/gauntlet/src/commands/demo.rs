@@ -1,10 +1,8 @@
 //! `gauntlet demo`: the whole path, from a moving hand to a moving gripper, with nothing but this machine.
 
-use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::Result;
-use gripper::Instant;
 use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
@@ -16,14 +14,12 @@ use super::{on_chip, teleop};
 use crate::cli::Demo;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
-use crate::outputs::Kind;
 use crate::platform::Clock;
 use crate::port::BAUD;
 use crate::poses::Motion;
 use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
 use crate::run::{End, Finished, Options, Run};
 use crate::session::{Parts, Session};
-use crate::session_log::SessionLog;
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Outcome, Request, train};
@@ -46,14 +42,8 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let motion = Motion::open_for_training(options.poses.as_deref(), options.seed)?;
     if let Some(path) = &options.log {
-        let inputs: Vec<_> = options.poses.iter().map(PathBuf::as_path).collect();
-        outputs::check(path, Kind::Log, &inputs)?;
+        outputs::check_new(path)?;
     }
-    let log = options
-        .log
-        .as_deref()
-        .map(|path| SessionLog::create(path, clock))
-        .transpose()?;
     tell.say(format_args!(
         "gauntlet demo: glove and gripper are virtual, everything between them is real"
     ));
@@ -66,23 +56,19 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     tell.say(format_args!(
         "weights    an image of {length} bytes is stored and checked in the bridge's weights store"
     ));
-    let mut run = Run::new(session, log, clock, interrupt.clone());
+    let mut run = Run::new(session, options.log.clone(), clock, interrupt.clone());
     let driven = drive(options, &mut run, &tell, interrupt);
-    let finished = run.finish()?;
+    let finished = run.finish();
     drop(devices);
-    let end = driven?;
-    let left = finished.stopped.judge();
     let told = Told {
         outcome: &outcome,
-        first_motion: finished.summary.first_motion.map(Instant::from_ticks),
-        finished: &finished,
         motion: &motion,
     };
-    told.tell(options, &tell)?;
-    left?;
-    match end {
-        End::Time => told.judge(),
-        End::Asked => Ok(()),
+    told.tell(options, &tell, &finished)?;
+    let moved = finished.summary.first_motion.is_some();
+    match finished.judge(driven)? {
+        End::Time if !moved => Err(not_moved()),
+        End::Time | End::Asked => Ok(()),
     }
 }
 
@@ -188,7 +174,7 @@ fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> R
         )
         .into());
     }
-    if !teleop::activate(run, tell, interrupt)? {
+    if !run.calibrate(tell)? || !teleop::activate(run, tell, interrupt)? {
         return Ok(End::Asked);
     }
     tell.say(format_args!(
@@ -203,18 +189,17 @@ fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> R
     })
 }
 
-/// All there is to say at the end.
+/// What the demo says at its end besides the run's own words.
 struct Told<'a> {
     outcome: &'a Outcome,
-    finished: &'a Finished,
-    first_motion: Option<Instant>,
     motion: &'a Motion,
 }
 
 impl Told<'_> {
-    fn tell(&self, options: &Demo, tell: &Tell) -> Result<()> {
-        let first_motion = self.first_motion.map(|at| at.as_ticks() as f64 / 1e6);
-        if options.json {
+    fn tell(&self, options: &Demo, tell: &Tell, finished: &Finished) -> Result<()> {
+        let began = finished.ending.is_some();
+        let first_motion = finished.summary.first_motion.map(|us| us as f64 / 1e6);
+        if options.json && began {
             return out::json(&json!({
                 "motion": self.motion.describe(),
                 "training_s": self.outcome.took.as_secs_f64(),
@@ -222,39 +207,31 @@ impl Told<'_> {
                 "pairs": self.outcome.pairs,
                 "quality": self.outcome.quality,
                 "first_motion_s": first_motion,
-                "gripper": self.finished.stopped,
-                "run": self.finished.summary,
-                "log": self.finished.log.as_ref().map(|log| &log.path),
+                "gripper": finished.gripper(),
+                "run": finished.summary,
+                "log": finished.log,
             }));
         }
-        tell.say(format_args!(
-            "summary    {}",
-            self.finished.stopped.judge().unwrap_or("the run is over")
-        ));
-        for line in self.finished.summary.lines() {
-            tell.say(format_args!("{line}"));
-        }
+        finished.tell(tell, "summary    ");
         if let Some(first) = first_motion {
             tell.say(format_args!(
                 "motion     the gripper first moved with the hand {first:.1} s after the start"
             ));
         }
-        tell.say(format_args!("map        {}", self.outcome.quality.line()));
-        tell.log(self.finished.log.as_ref());
+        if began {
+            tell.say(format_args!("map        {}", self.outcome.quality.line()));
+        }
         Ok(())
     }
+}
 
-    /// A demo in which the gripper did not move has failed, whatever was printed.
-    fn judge(&self) -> Result<()> {
-        if self.first_motion.is_some() {
-            return Ok(());
-        }
-        Err(Failure::new(
-            "the gripper did not move with the hand",
-            "--log FILE.mcap, whose events say what held it",
-        )
-        .into())
-    }
+/// A demo in which the gripper did not move has failed, whatever was printed.
+fn not_moved() -> anyhow::Error {
+    Failure::new(
+        "the gripper did not move with the hand",
+        "--log FILE.mcap, whose events say what held it",
+    )
+    .into()
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use rig::pty::Handle;
 use serde_json::json;
 
 use super::{bridge, demo, flash};
-use crate::chip::{Options, Summary, Watch};
+use crate::chip::{Options, Summary, Watch, Watched};
 use crate::cli::Demo;
 use crate::emulator::{Emulator, Setup, find_firmware};
 use crate::failure::Failure;
@@ -50,7 +50,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let flashed = flash::flash(&mut link, &image, &tell, interrupt)?;
     let driven = drive(options, &mut link, &tell, interrupt)?;
     emulator.power_off();
-    let Some((summary, end)) = driven else {
+    let Some(watched) = driven else {
         return Ok(());
     };
     if options.json {
@@ -61,18 +61,23 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             "pairs": outcome.pairs,
             "quality": outcome.quality,
             "flash": flashed,
-            "run": summary,
+            "gripper": watched.stopped,
+            "run": watched.summary,
         }))?;
     } else {
-        tell.say(format_args!("summary    the gripper is held where it is"));
-        summary
+        if let Some(stopped) = watched.stopped {
+            tell.say(format_args!("summary    {}", stopped.judge()?));
+        }
+        watched
+            .summary
             .lines()
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
         tell.say(format_args!("map        {}", outcome.quality.line()));
     }
-    match end {
-        End::Time => judge(&summary),
+    watched.attended()?;
+    match watched.end {
+        End::Time => judge(&watched.summary),
         End::Asked => Ok(()),
     }
 }
@@ -95,8 +100,11 @@ fn drive(
     link: &mut HostLink,
     tell: &Tell,
     interrupt: &Interrupt,
-) -> Result<Option<(Summary, End)>> {
-    if !wait_for_frames(link, interrupt)? || !bridge::activated(link, tell, interrupt)? {
+) -> Result<Option<Watched>> {
+    if !wait_for_frames(link, interrupt)?
+        || !bridge::calibrated(link, tell, interrupt)?
+        || !bridge::activated(link, tell, interrupt)?
+    {
         return Ok(None);
     }
     tell.say(format_args!(

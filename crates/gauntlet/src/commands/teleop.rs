@@ -10,13 +10,11 @@ use serde_json::json;
 use crate::cli::{Hand, Teleop};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::outputs::Kind;
 use crate::platform::Clock;
 use crate::port::BAUD;
 use crate::record::AXES;
 use crate::run::{Options, Run};
 use crate::session::{Order, Parts, Session};
-use crate::session_log::SessionLog;
 use crate::tell::Tell;
 use crate::{model, out, outputs, ports, probe, words};
 
@@ -24,8 +22,6 @@ use crate::{model, out, outputs, ports, probe, words};
 const FRAME_WAIT: Duration = Duration::from_secs(15);
 /// An activation takes a few seconds; a gripper that needs longer has a fault.
 pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
-/// For a calibration on the first good frame.
-const CALIBRATION_WAIT: Duration = Duration::from_secs(3);
 
 /// Runs until its time is over or somebody ends it.
 ///
@@ -37,7 +33,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     check_model(options)?;
     let line = options.line.settings(&options.gripper)?;
     if let Some(path) = &options.log {
-        outputs::check(path, Kind::Log, &[&options.model])?;
+        outputs::check_new(path)?;
     }
     let image = model::weights(&options.model, None)?.image;
     let config = config(options.hand)?;
@@ -60,11 +56,6 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         ));
     }
     let clock = Clock::start();
-    let log = options
-        .log
-        .as_deref()
-        .map(|path| SessionLog::create(path, clock))
-        .transpose()?;
     let parts = Parts {
         glove: glove.port,
         gripper,
@@ -72,33 +63,24 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         config,
     };
     let session = Session::start(parts, clock, interrupt)?;
-    let mut run = Run::new(session, log, clock, interrupt.clone());
-    let result = prepare(options, &mut run, &tell, interrupt, status).and_then(|go_on| {
+    let mut run = Run::new(session, options.log.clone(), clock, interrupt.clone());
+    let driven = prepare(options, &mut run, &tell, interrupt, status).and_then(|go_on| {
         if go_on {
             drive(options, &mut run)?;
         }
         Ok(())
     });
-    let finished = run.finish()?;
-    result?;
-    let left = finished.stopped.judge();
-    if let Ok(left) = &left {
-        tell.say(format_args!("{left}"));
-    }
-    if options.json {
+    let finished = run.finish();
+    if !options.json {
+        finished.tell(&tell, "");
+    } else if finished.ending.is_some() {
         out::json(&json!({
-            "gripper": finished.stopped,
+            "gripper": finished.gripper(),
             "run": finished.summary,
-            "log": finished.log.map(|log| log.path),
+            "log": finished.log,
         }))?;
-    } else {
-        let lines = finished.summary.lines();
-        lines
-            .iter()
-            .for_each(|line| tell.say(format_args!("{line}")));
-        tell.log(finished.log.as_ref());
     }
-    left.map(|_| ())
+    finished.judge(driven)
 }
 
 fn check_ports(options: &Teleop) -> Result<()> {
@@ -167,7 +149,7 @@ fn prepare(
     if !framed {
         return Err(no_frames(&options.glove));
     }
-    if options.calibrate_flat && !calibrate(run, tell)? {
+    if options.calibrate_flat && !run.calibrate(tell)? {
         return Ok(false);
     }
     if status.activation == Activation::Ready {
@@ -198,25 +180,6 @@ fn prepare(
         "not activated: you can watch the hand, the gripper will not move"
     ));
     Ok(true)
-}
-
-/// Takes the hand as flat, now.
-fn calibrate(run: &mut Run, tell: &Tell) -> Result<bool> {
-    let calibrations = run.calibrations();
-    run.order(Order::Calibrate);
-    let end = std::time::Instant::now() + CALIBRATION_WAIT;
-    while std::time::Instant::now() < end {
-        run.wait(Duration::from_millis(50), |_| false)?;
-        if run.calibrations() > calibrations {
-            tell.say(format_args!("calibrated on the flat hand"));
-            return Ok(true);
-        }
-    }
-    Err(Failure::new(
-        "no complete frame came for the calibration",
-        "all 16 sensors plugged in, the hand flat and still",
-    )
-    .into())
 }
 
 /// Activates the gripper and waits until it is ready. Returns whether to go on.

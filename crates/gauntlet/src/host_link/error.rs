@@ -38,6 +38,16 @@ pub enum Error {
     /// The bridge's own word.
     #[error("the bridge refuses: {}", refusal_words(.0).0)]
     Refused(Refusal),
+    /// It speaks an older version of the protocol, which lacks this.
+    #[error(
+        "the bridge speaks version {bridge} of the host protocol, this tool version {VERSION}: {what} needs the same on both"
+    )]
+    Older {
+        /// What was asked for.
+        what: &'static str,
+        /// The bridge's version.
+        bridge: u16,
+    },
     /// It answered something else than was asked.
     #[error("the bridge answered {0}, which is no answer to what it was asked")]
     Confused(String),
@@ -91,6 +101,8 @@ pub struct Heard {
     pub foreign: u32,
     /// Telemetry samples.
     pub samples: u32,
+    /// The request itself, come back.
+    pub echoes: u32,
 }
 
 impl fmt::Display for Heard {
@@ -107,12 +119,13 @@ impl fmt::Display for Heard {
             ),
             (self.foreign, "replies to other requests"),
             (self.samples, "telemetry samples"),
+            (self.echoes, "copies of the request itself"),
         ] {
             if count > 0 {
                 write!(f, ", {count} {what}")?;
             }
         }
-        let named = self.damaged + self.unknown + self.foreign + self.samples;
+        let named = self.damaged + self.unknown + self.foreign + self.samples + self.echoes;
         f.write_str(if named == 0 {
             ", no frame among them"
         } else {
@@ -143,6 +156,12 @@ impl From<Error> for Failure {
             Error::Lost => "the cable, and the bridge's power; then the same command again".to_owned(),
             Error::Silent { heard, .. } if heard.unknown > 0 => {
                 "the tool and the firmware of the same release".to_owned()
+            }
+            Error::Older { .. } => {
+                "this release's firmware in the bridge: `cargo xtask firmware` builds it; weights can be flashed as it is".to_owned()
+            }
+            Error::Silent { heard, .. } if heard.echoes > 0 => {
+                "the wiring: the line sends back what is sent to it, and no bridge answers; TX and RX bridged, or a program that echoes".to_owned()
             }
             Error::Silent { heard, .. } if heard.bytes > 0 => {
                 "that this is UART 0 of a bridge, 115200 baud at both ends, and that no other program speaks on this line".to_owned()
@@ -202,6 +221,10 @@ pub fn refusal_words(refusal: &Refusal) -> (String, String) {
                 None => (text, String::new()),
             }
         }
+        Refusal::Heartbeat(why) => (
+            why.to_string(),
+            "closing the clutch again, if that is what you want".to_owned(),
+        ),
         Refusal::Configuration {
             key,
             value,

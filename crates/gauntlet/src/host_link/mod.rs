@@ -4,6 +4,7 @@
 //! twice; after [`ATTEMPTS`] the bridge counts as silent. Every frame starts with a zero, which ends whatever noise came
 //! before it. [`flash`](HostLink::flash) opens a broken line again and goes on where the bridge says it was.
 
+mod clutch;
 mod error;
 mod flash;
 mod line;
@@ -13,12 +14,14 @@ mod tests;
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
+use bridge::Epoch;
 use bridge::protocol::frame::{self, Decoder};
 use bridge::protocol::message::{
-    Answer, Call, Counters, FromBridge, Hello, Refusal, Reply, Request, Sample, Slots, Status,
-    VERSION,
+    Answer, Call, Counters, FromBridge, Health, Hello, OLDEST_ASKED, Refusal, Reply, Request,
+    Sample, Slots, Status, VERSION,
 };
 
+pub use clutch::Heartbeat;
 pub use error::{Error, Heard, refusal_words};
 pub use flash::Flashed;
 pub use line::Address;
@@ -33,8 +36,6 @@ const REPLY_WAIT: Duration = Duration::from_millis(300);
 const CHUNK_WAIT: Duration = Duration::from_secs(1);
 /// For a reply to what erases or checks flash; an erase block of a real chip takes up to 2 s.
 const FLASH_WAIT: Duration = Duration::from_secs(3);
-/// For a heartbeat: the next one is due then.
-const HEARTBEAT_WAIT: Duration = Duration::from_millis(100);
 /// A session that another host let go of ends after 2 s.
 const BUSY_WAIT: Duration = Duration::from_millis(2_500);
 const BUSY_PAUSE: Duration = Duration::from_millis(250);
@@ -54,6 +55,8 @@ pub struct HostLink {
     repeats: u32,
     /// Since the newest request was first sent.
     heard: Heard,
+    /// The newest request as it was sent, to know its echo by.
+    asked: Vec<u8>,
 }
 
 impl HostLink {
@@ -72,6 +75,7 @@ impl HostLink {
             samples: VecDeque::new(),
             repeats: 0,
             heard: Heard::default(),
+            asked: Vec::new(),
         };
         link.reconnect()?;
         Ok(link)
@@ -98,12 +102,32 @@ impl HostLink {
     }
 
     fn say_hello(&mut self) -> Result<(), Error> {
-        match self.call(&Call::Hello { version: VERSION })? {
+        let answer = match self.call(&Call::Hello { version: VERSION }) {
+            // An older bridge can be asked and flashed; its clutch is not for this tool.
+            Err(Error::Refused(Refusal::Version { bridge }))
+                if (OLDEST_ASKED..VERSION).contains(&bridge) =>
+            {
+                self.call(&Call::Hello { version: bridge })?
+            }
+            answer => answer?,
+        };
+        match answer {
             Answer::Hello(hello) => {
                 self.hello = Some(hello);
                 Ok(())
             }
             other => Err(confused(&other)),
+        }
+    }
+
+    /// Fails where the bridge speaks an older version, which lacks what is asked for.
+    fn require_own_version(&self, what: &'static str) -> Result<(), Error> {
+        match self.hello {
+            Some(hello) if hello.version < VERSION => Err(Error::Older {
+                what,
+                bridge: hello.version,
+            }),
+            _ => Ok(()),
         }
     }
 
@@ -152,6 +176,7 @@ impl HostLink {
         };
         let bytes = framed(&request)?;
         self.heard = Heard::default();
+        self.asked.clone_from(&bytes);
         let damaged_before = self.damaged();
         for attempt in 0..attempts {
             self.repeats += u32::from(attempt > 0);
@@ -188,24 +213,25 @@ impl HostLink {
         Error::Lost
     }
 
-    /// The next reply by `deadline`; samples on the way are kept.
+    /// The next reply by `deadline`, which no stream of bytes puts off; samples on the way are kept.
     fn receive(&mut self, deadline: Instant) -> Result<Option<Reply>, Error> {
         let mut byte = [0];
-        loop {
+        while Instant::now() < deadline {
             let line = self.line.as_mut().ok_or(Error::Lost)?;
             match line.read(&mut byte, deadline) {
                 Ok(0) => return Ok(None),
                 Ok(_) => self.heard.bytes = self.heard.bytes.saturating_add(1),
                 Err(_) => return Err(self.lose()),
             }
-            let message = self
-                .decoder
-                .push(byte[0], |message| postcard::from_bytes(message).ok());
+            let message = self.decoder.push(byte[0], |message| {
+                postcard::from_bytes(message).map_err(|_| framed_bytes(message).ok())
+            });
             match message {
                 None => {}
-                Some(None) => self.heard.unknown += 1,
-                Some(Some(FromBridge::Reply(reply))) => return Ok(Some(reply)),
-                Some(Some(FromBridge::Sample(sample))) => {
+                Some(Err(Some(own))) if own == self.asked => self.heard.echoes += 1,
+                Some(Err(_)) => self.heard.unknown += 1,
+                Some(Ok(FromBridge::Reply(reply))) => return Ok(Some(reply)),
+                Some(Ok(FromBridge::Sample(sample))) => {
                     self.heard.samples += 1;
                     if self.samples.len() == SAMPLES {
                         self.samples.pop_front();
@@ -214,6 +240,7 @@ impl HostLink {
                 }
             }
         }
+        Ok(None)
     }
 
     /// Telemetry samples that have come, after listening for `time`.
@@ -227,34 +254,42 @@ impl HostLink {
         Ok(self.samples.drain(..).collect())
     }
 
-    /// Closes the clutch for 250 ms, or keeps it closed. `None` when no answer came in 100 ms: say it again then.
-    ///
-    /// # Errors
-    /// The line's fault, or the bridge's refusal.
-    pub fn engage(&mut self) -> Result<Option<Status>, Error> {
-        // Not repeated: a repetition is not done again by the bridge, and would not keep the clutch closed.
-        match self.ask(&Call::Engage, HEARTBEAT_WAIT, 1) {
-            Ok(Answer::Status(status)) => Ok(Some(status)),
-            Ok(other) => Err(confused(&other)),
-            Err(Error::Silent { .. }) => Ok(None),
-            Err(error) => Err(error),
-        }
-    }
-
-    /// Opens the clutch.
-    ///
-    /// # Errors
-    /// As [`HostLink::call`].
-    pub fn release(&mut self) -> Result<Status, Error> {
-        as_status(self.call(&Call::Release)?)
-    }
-
     /// What the bridge is doing.
     ///
     /// # Errors
     /// As [`HostLink::call`].
     pub fn status(&mut self) -> Result<Status, Error> {
         as_status(self.call(&Call::Status)?)
+    }
+
+    /// What keeps it from moving, beside its devices.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`], and [`Error::Older`] from a bridge of an older version.
+    pub fn health(&mut self) -> Result<Health, Error> {
+        self.require_own_version("calibration")?;
+        match self.call(&Call::Health)? {
+            Answer::Health(health) => Ok(health),
+            other => Err(confused(&other)),
+        }
+    }
+
+    /// Takes the hand, flat and still, as all joints at zero; [`HostLink::health`] tells how it ended.
+    ///
+    /// # Errors
+    /// As [`HostLink::health`].
+    pub fn calibrate_flat_hand(&mut self) -> Result<(), Error> {
+        self.require_own_version("calibration")?;
+        self.done(&Call::CalibrateFlatHand)
+    }
+
+    /// Takes the newest calibration back.
+    ///
+    /// # Errors
+    /// As [`HostLink::health`].
+    pub fn undo_calibration(&mut self) -> Result<(), Error> {
+        self.require_own_version("calibration")?;
+        self.done(&Call::CalibrateUndo)
     }
 
     /// What it has counted.
@@ -346,15 +381,20 @@ fn new_session() -> u32 {
 
 /// A zero, which ends whatever came before, and the request's frame.
 fn framed(request: &Request<'_>) -> Result<Vec<u8>, Error> {
+    let mut room = [0; frame::MAX_MESSAGE];
+    let message = postcard::to_slice(request, &mut room).map_err(|_| Error::TooLong)?;
+    framed_bytes(message)
+}
+
+/// The same of a message's bytes.
+fn framed_bytes(message: &[u8]) -> Result<Vec<u8>, Error> {
     let mut scratch = [0; frame::SCRATCH];
-    let room = scratch
-        .get_mut(..frame::MAX_MESSAGE)
-        .ok_or(Error::TooLong)?;
-    let length = postcard::to_slice(request, room)
-        .map_err(|_| Error::TooLong)?
-        .len();
+    scratch
+        .get_mut(..message.len())
+        .ok_or(Error::TooLong)?
+        .copy_from_slice(message);
     let mut out = [0; frame::MAX_FRAME];
-    let coded = frame::encode(&mut scratch, length, &mut out).map_err(|_| Error::TooLong)?;
+    let coded = frame::encode(&mut scratch, message.len(), &mut out).map_err(|_| Error::TooLong)?;
     let mut bytes = vec![0];
     bytes.extend_from_slice(coded);
     Ok(bytes)

@@ -296,7 +296,7 @@ fn a_refusal_is_told_in_one_line_with_its_next_step() {
     let failure = Failure::from(result.unwrap_err());
     assert_eq!(
         failure.to_string(),
-        "the bridge refuses: it speaks version 9 of the host protocol, this tool version 2"
+        "the bridge refuses: it speaks version 9 of the host protocol, this tool version 3"
     );
     assert!(!failure.next_step().is_empty());
 }
@@ -342,4 +342,87 @@ fn two_hosts_and_every_other_refusal_have_words_and_a_next_step() {
         assert!(what.contains(word), "{refusal:?}: {what}");
         assert!(!next.is_empty(), "{refusal:?}");
     }
+}
+
+#[test]
+fn an_older_bridge_is_asked_and_flashed_and_never_engaged() {
+    let older = Hello {
+        version: 2,
+        ..HELLO
+    };
+    let script = vec![
+        Do::Answer(Err(Refusal::Version { bridge: 2 })),
+        Do::Answer(Ok(Answer::Hello(older))),
+        Do::Answer(Ok(slots(7))),
+    ];
+    let ((), heard) = talk(script, |address| {
+        let mut link = HostLink::connect(address).unwrap();
+        assert_eq!(link.slots().map(|slots| slots.active), Ok(Some(1)));
+        let refused = Error::Older {
+            what: "the clutch",
+            bridge: 2,
+        };
+        assert_eq!(link.engage(), Err(refused));
+        let health = link.health();
+        assert!(matches!(health, Err(Error::Older { bridge: 2, .. })));
+    });
+    let names: Vec<&str> = heard.iter().map(|(_, name)| name.as_str()).collect();
+    assert_eq!(names, ["Hello", "Hello", "Slots"]);
+}
+
+#[test]
+fn a_line_that_never_stops_sending_is_given_up_in_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bridge");
+    let listener = UnixListener::bind(&path).unwrap();
+    let flood = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        while stream.write_all(&[b'x'; 4096]).is_ok() {}
+    });
+    let Err(Error::Silent { heard, .. }) = HostLink::connect(&Address::Unix(path)) else {
+        panic!("no bridge is there");
+    };
+    assert!(heard.bytes > 0);
+    flood.join().unwrap();
+}
+
+#[test]
+fn a_line_that_echoes_is_told_as_such() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("bridge");
+    let listener = UnixListener::bind(&path).unwrap();
+    let echo = std::thread::spawn(move || {
+        let (mut stream, _) = listener.accept().unwrap();
+        let mut bytes = [0; 256];
+        while let Ok(count @ 1..) = stream.read(&mut bytes) {
+            if stream.write_all(&bytes[..count]).is_err() {
+                break;
+            }
+        }
+    });
+    let error = HostLink::connect(&Address::Unix(path)).unwrap_err();
+    let Error::Silent { heard, .. } = &error else {
+        panic!("{error}");
+    };
+    assert_eq!(heard.echoes, ATTEMPTS);
+    let failure = Failure::from(error);
+    assert!(
+        format!("{failure:?}").contains("sends back what is sent"),
+        "{failure:?}"
+    );
+    echo.join().unwrap();
+}
+
+#[test]
+fn counters_that_do_not_come_cost_no_heartbeat() {
+    use bridge::clutch::HeartbeatRefusal::Expired;
+    let refused = Do::Answer(Err(Refusal::Heartbeat(Expired)));
+    let ((), heard) = talk(vec![hello(), Do::Ignore, refused], |address| {
+        let mut link = HostLink::connect(address).unwrap();
+        let end = Instant::now() + Duration::from_millis(50);
+        assert_eq!(link.counters_by(end), Ok(None));
+        assert_eq!(link.heartbeat(3), Ok(Heartbeat::Refused));
+    });
+    let names: Vec<&str> = heard.iter().map(|(_, name)| name.as_str()).collect();
+    assert_eq!(names, ["Hello", "Counters", "Heartbeat"], "asked once");
 }

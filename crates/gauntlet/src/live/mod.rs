@@ -2,24 +2,32 @@
 
 mod bars;
 mod draw;
+mod keys;
+mod raw;
+mod small;
 mod view;
 
-use std::io::{IsTerminal, Stdout, stdout};
+use std::io::IsTerminal;
 use std::time::{Duration, Instant};
 
-use ratatui::Terminal;
 use ratatui::backend::CrosstermBackend;
-use ratatui::crossterm::event::{self, Event, KeyCode, KeyEventKind, KeyModifiers};
+use ratatui::layout::Rect;
+use ratatui::{Terminal, TerminalOptions, Viewport};
 
 pub use draw::draw;
+pub use small::LEAST;
 pub use view::{Axis, Finger, View};
 
-use crate::say;
+use crate::{out, say};
+use keys::{Keyboard, hung_up};
+use raw::Raw;
 
 /// Pause between two drawings.
 const DRAW_EVERY: Duration = Duration::from_millis(80);
 /// Pause between two plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(1);
+/// A view that was not taken for so long is one that nobody sees.
+const UNSEEN: Duration = Duration::from_millis(250);
 
 /// What a person asked for with a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +36,8 @@ pub enum Key {
     End,
     /// Space: close or open the clutch.
     Clutch,
+    /// Space where it may be text, or several at once: open the clutch if it is closed, never close it.
+    Open,
     /// `c`: the hand is flat now, calibrate on it.
     Calibrate,
 }
@@ -35,9 +45,49 @@ pub enum Key {
 /// Where the view goes.
 #[derive(Debug)]
 enum Target {
-    Drawn(Terminal<CrosstermBackend<Stdout>>),
+    Drawn(Box<Drawn>),
     Lines,
     Quiet,
+}
+
+#[derive(Debug)]
+struct Drawn {
+    terminal: Terminal<CrosstermBackend<out::Screen>>,
+    area: Rect,
+    keyboard: Keyboard,
+    raw: Raw,
+}
+
+impl Drawn {
+    fn start() -> std::io::Result<Self> {
+        let raw = Raw::enter()?;
+        let area = raw::size();
+        Ok(Self {
+            terminal: empty(area)?,
+            area,
+            keyboard: Keyboard::default(),
+            raw,
+        })
+    }
+
+    fn show(&mut self, view: &View) -> std::io::Result<()> {
+        let area = raw::size();
+        if area != self.area {
+            self.area = area;
+            self.terminal.resize(area)?;
+        }
+        self.terminal.draw(|frame| draw(view, frame))?;
+        Ok(())
+    }
+}
+
+/// A terminal on which nothing is drawn yet.
+fn empty(area: Rect) -> std::io::Result<Terminal<CrosstermBackend<out::Screen>>> {
+    let backend = CrosstermBackend::new(out::Screen::default());
+    let options = TerminalOptions {
+        viewport: Viewport::Fixed(area),
+    };
+    Terminal::with_options(backend, options)
 }
 
 /// The running view. Dropping it gives the terminal back as it was, also in a panic.
@@ -45,6 +95,8 @@ enum Target {
 pub struct Live {
     target: Target,
     shown: Option<Instant>,
+    /// Whether somebody sits at a terminal, who may close it.
+    terminal: bool,
 }
 
 impl Live {
@@ -53,17 +105,19 @@ impl Live {
     /// # Errors
     /// The terminal's error where it refuses raw mode.
     pub fn start(quiet: bool) -> std::io::Result<Self> {
-        let target = if stdout().is_terminal() && std::io::stdin().is_terminal() && !quiet {
-            // Also installs a panic hook that restores the terminal before the message is printed.
-            Target::Drawn(ratatui::try_init()?)
-        } else if quiet {
+        out::hurry();
+        let terminal = std::io::stdin().is_terminal();
+        let target = if quiet {
             Target::Quiet
+        } else if std::io::stdout().is_terminal() && terminal {
+            Target::Drawn(Box::new(Drawn::start()?))
         } else {
             Target::Lines
         };
         Ok(Self {
             target,
             shown: None,
+            terminal,
         })
     }
 
@@ -72,7 +126,12 @@ impl Live {
         matches!(self.target, Target::Drawn(_))
     }
 
-    /// Shows `view` where it is time to.
+    /// Whether the view was not taken for so long that nobody can be said to see it: then no heartbeat is due.
+    pub fn unseen(&self) -> bool {
+        !matches!(self.target, Target::Quiet) && out::unseen() >= UNSEEN
+    }
+
+    /// Shows `view` where it is time to, and where the view before was taken. Never waits.
     ///
     /// # Errors
     /// The terminal's error.
@@ -90,58 +149,46 @@ impl Live {
                 now
             }
         });
-        if now.duration_since(first) < every {
+        if now.duration_since(first) < every || out::pending() {
             return Ok(());
         }
         // Kept on the beat, but never more than one beat behind.
         self.shown = Some((first + every).max(now.checked_sub(every).unwrap_or(now)));
         match &mut self.target {
-            Target::Drawn(terminal) => {
-                let view = view();
-                terminal.draw(|frame| draw(&view, frame))?;
-            }
+            Target::Drawn(drawn) => drawn.show(&view())?,
             Target::Lines => say!("{}", view().line()),
             Target::Quiet => {}
         }
         Ok(())
     }
 
-    /// Keys pressed since the last call. Never waits.
+    /// Keys pressed since the last call; [`Key::End`] where the terminal was closed. Never waits.
     ///
     /// # Errors
-    /// The terminal's error.
+    /// None; kept for views that have any.
     pub fn keys(&mut self) -> std::io::Result<Vec<Key>> {
-        let mut keys = Vec::new();
-        if self.interactive() {
-            while event::poll(Duration::ZERO)? {
-                keys.extend(meaning(&event::read()?));
-            }
-        }
-        Ok(keys)
+        Ok(match &mut self.target {
+            Target::Drawn(drawn) => drawn.keyboard.read(Instant::now()),
+            _ if self.terminal && hung_up(&std::io::stdin()) => vec![Key::End],
+            _ => Vec::new(),
+        })
     }
-}
 
-fn meaning(event: &Event) -> Option<Key> {
-    let Event::Key(key) = event else {
-        return None;
-    };
-    if key.kind != KeyEventKind::Press {
-        return None;
-    }
-    match key.code {
-        KeyCode::Char('q') | KeyCode::Esc => Some(Key::End),
-        KeyCode::Char('c' | 'd') if key.modifiers.contains(KeyModifiers::CONTROL) => Some(Key::End),
-        KeyCode::Char('c') => Some(Key::Calibrate),
-        KeyCode::Char(' ') => Some(Key::Clutch),
-        _ => None,
-    }
-}
-
-impl Drop for Live {
-    fn drop(&mut self) {
-        if let Target::Drawn(_) = self.target {
-            ratatui::restore();
+    /// Gives the terminal back while `stop` stops this program, and takes it again when it goes on.
+    ///
+    /// # Errors
+    /// The terminal's error, or that of `stop`.
+    pub fn aside(&mut self, stop: impl FnOnce() -> std::io::Result<()>) -> std::io::Result<()> {
+        if let Target::Drawn(drawn) = &mut self.target {
+            drawn.raw.leave();
         }
+        stop()?;
+        if let Target::Drawn(drawn) = &mut self.target {
+            drawn.raw.again()?;
+            // Whatever stands there now is drawn over, all of it.
+            drawn.terminal = empty(drawn.area)?;
+        }
+        Ok(())
     }
 }
 

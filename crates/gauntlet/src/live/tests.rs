@@ -2,7 +2,6 @@ use std::time::Duration;
 
 use ratatui::Terminal;
 use ratatui::backend::TestBackend;
-use ratatui::crossterm::event::{Event, KeyCode, KeyEvent, KeyModifiers};
 
 use super::bars::{Cell, axis, signed};
 use super::*;
@@ -31,6 +30,7 @@ fn view() -> View {
             .zip([0.0, 0.4, 0.8, 1.2, 1.6])
             .map(|(name, first)| finger(name, first))
             .collect(),
+        hand_age: None,
         axes: [
             ("finger A", 128),
             ("finger B", 255),
@@ -45,6 +45,7 @@ fn view() -> View {
             word: "moving",
         })
         .collect(),
+        gripper_age: None,
         frames_per_s: 25.6,
         cycles_per_s: 98.4,
         latency_p50: Some(31_200),
@@ -130,23 +131,62 @@ fn an_axis_bar_fills_to_the_measured_and_marks_the_asked_position() {
 }
 
 #[test]
-fn keys_mean_what_the_foot_line_says() {
-    let key = |code, modifiers| Event::Key(KeyEvent::new(code, modifiers));
-    assert_eq!(
-        meaning(&key(KeyCode::Char(' '), KeyModifiers::NONE)),
-        Some(Key::Clutch)
+fn on_a_small_terminal_the_state_the_axes_and_what_is_wrong_are_whole() {
+    for (width, height) in [(60, 20), (40, 12), LEAST] {
+        let text = drawn(width, height);
+        for part in [
+            "engaged", "finger A", "finger B", "finger C", "scissor", "128→64", "sensor",
+        ] {
+            assert!(
+                text.contains(part),
+                "{part} is missing at {width}×{height} in\n{text}"
+            );
+        }
+        assert!(!text.contains("too small"), "{text}");
+        // No half boxes: either all four corners of each, or none at all.
+        let corners = |corner| text.matches(corner).count();
+        assert_eq!(corners('┌'), corners('┘'), "{text}");
+    }
+    let text = drawn(60, 20);
+    assert!(text.contains("thumb") && text.contains("little"), "{text}");
+    assert!(drawn(40, 12).contains("space: clutch"));
+}
+
+#[test]
+fn a_terminal_below_the_least_size_says_so_and_the_state() {
+    let text = drawn(LEAST.0, LEAST.1 - 1);
+    assert!(
+        text.contains("engaged") && text.contains("too small: 30×7"),
+        "{text}"
     );
-    assert_eq!(
-        meaning(&key(KeyCode::Char('q'), KeyModifiers::NONE)),
-        Some(Key::End)
+}
+
+#[test]
+fn what_is_old_is_marked_in_boxes_on_small_terminals_and_in_the_line() {
+    let mut view = view();
+    (view.hand_age, view.gripper_age) = (Some(3.25), Some(1.5));
+    let line = view.line();
+    assert!(
+        line.contains("hand 3.2 s old") && line.contains("1.5 s old"),
+        "{line}"
     );
-    assert_eq!(
-        meaning(&key(KeyCode::Char('c'), KeyModifiers::CONTROL)),
-        Some(Key::End)
+    for (width, height) in [(80, 24), (40, 12)] {
+        let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
+        terminal.draw(|frame| draw(&view, frame)).unwrap();
+        let text = terminal.backend().to_string();
+        assert!(text.contains("3.2 s old"), "{text}");
+    }
+}
+
+#[test]
+fn faults_that_do_not_fit_are_counted() {
+    let mut view = view();
+    view.faults = (1..=9).map(|k| format!("fault {k}")).collect();
+    let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
+    terminal.draw(|frame| draw(&view, frame)).unwrap();
+    let text = terminal.backend().to_string();
+    assert!(
+        text.contains("fault 1") && text.contains("and 8 more"),
+        "{text}"
     );
-    assert_eq!(
-        meaning(&key(KeyCode::Char('c'), KeyModifiers::NONE)),
-        Some(Key::Calibrate)
-    );
-    assert_eq!(meaning(&key(KeyCode::Char('x'), KeyModifiers::NONE)), None);
 }

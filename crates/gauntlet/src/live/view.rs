@@ -45,8 +45,12 @@ pub struct View {
     pub following: bool,
     /// The fingers, thumb first.
     pub fingers: Vec<Finger>,
+    /// Age of the hand's angles in seconds, where they are old.
+    pub hand_age: Option<f32>,
     /// The gripper's axes.
     pub axes: Vec<Axis>,
+    /// Age of the gripper's positions in seconds, where they are old.
+    pub gripper_age: Option<f32>,
     /// Glove frames a second.
     pub frames_per_s: f64,
     /// Gripper cycles a second.
@@ -80,13 +84,20 @@ impl View {
                 )
             })
             .collect();
+        let old = [
+            old(self.hand_age).map(|age| format!("  hand {age}")),
+            old(self.gripper_age).map(|age| format!("  positions {age}")),
+        ]
+        .into_iter()
+        .flatten()
+        .collect::<String>();
         let fault = if self.faults.is_empty() {
             String::new()
         } else {
             format!(" | {}", self.faults.join("; "))
         };
         format!(
-            "{:5.1} s  {:<11} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{fault}",
+            "{:5.1} s  {:<11} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{old}{fault}",
             self.elapsed.as_secs_f64(),
             self.state,
             axes.join("  "),
@@ -102,4 +113,9 @@ impl View {
 /// A count, or a dash.
 pub(super) fn count(value: Option<u8>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| value.to_string())
+}
+
+/// What stands beside a number that is old.
+pub(super) fn old(age: Option<f32>) -> Option<String> {
+    age.map(|age| format!("{age:.1} s old"))
 }

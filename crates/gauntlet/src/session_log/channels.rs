@@ -68,7 +68,7 @@ pub(super) fn messages(record: &Record) -> Vec<(Channel, Value)> {
         Record::Frame(frame) => frame_messages(frame),
         Record::Command(command) => vec![(Channel::Command, command_message(command))],
         Record::Status(status) => vec![(Channel::Status, status_message(status))],
-        Record::Event { at, sort, text } => vec![(
+        Record::Event { at, sort, text, .. } => vec![(
             Channel::Events,
             json!({ "time_us": at.as_ticks(), "fault": *sort == Sort::Fault, "text": text }),
         )],

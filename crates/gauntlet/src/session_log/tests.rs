@@ -34,6 +34,7 @@ fn records() -> Vec<Record> {
             at: at(1),
             sort: crate::record::Sort::Note,
             text: "begin".to_owned(),
+            kind: bridge::event::Kind::ActivationRequested,
         },
         frame(0),
         frame(1),
@@ -85,9 +86,11 @@ fn read_back(path: &Path) -> BTreeMap<String, Vec<Value>> {
 fn every_record_is_in_the_log_once_under_its_topic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut log = SessionLog::create(&path, Clock::start()).unwrap();
-    records().into_iter().for_each(|record| log.take(record));
-    let written = log.finish().unwrap();
+    let mut late = records();
+    let early = late.drain(..2).collect();
+    let mut log = SessionLog::create(&path, Clock::start(), early).unwrap();
+    late.into_iter().for_each(|record| log.take(record));
+    let written = log.finish();
     assert_eq!((written.messages, written.lost), (8, 0));
 
     let found = read_back(&path);
@@ -119,9 +122,9 @@ fn every_record_is_in_the_log_once_under_its_topic() {
 fn numbers_come_back_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut log = SessionLog::create(&path, Clock::start()).unwrap();
+    let mut log = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap();
     log.take(frame(1));
-    log.finish().unwrap();
+    log.finish();
     let found = read_back(&path);
     let angle = found["/glove/joint_angles"][0]["angles"]["thumb_cmc_abd"]
         .as_f64()
@@ -133,7 +136,7 @@ fn numbers_come_back_bit_for_bit() {
 fn a_log_dropped_without_finish_is_still_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut log = SessionLog::create(&path, Clock::start()).unwrap();
+    let mut log = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap();
     log.take(frame(0));
     drop(log);
     assert!(
@@ -146,6 +149,42 @@ fn a_log_dropped_without_finish_is_still_whole() {
 
 #[test]
 fn a_folder_that_does_not_exist_is_named() {
-    let error = SessionLog::create(Path::new("/nowhere/run.mcap"), Clock::start()).unwrap_err();
+    let error =
+        SessionLog::create(Path::new("/nowhere/run.mcap"), Clock::start(), Vec::new()).unwrap_err();
     assert!(error.to_string().contains("/nowhere/run.mcap"), "{error}");
+}
+
+#[test]
+fn a_file_that_is_there_is_never_written_over_not_even_an_empty_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    for content in ["precious", ""] {
+        std::fs::write(&path, content).unwrap();
+        let error = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap_err();
+        assert!(error.to_string().contains("run.mcap"), "{error}");
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
+    }
+}
+
+#[test]
+fn while_a_log_is_written_all_but_its_last_second_can_be_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut log = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap();
+    log.take(frame(1));
+    let end = std::time::Instant::now() + Duration::from_secs(10);
+    // Whole chunks from the start, as a reader takes them from the file of a program that was killed.
+    let readable = || {
+        let bytes = std::fs::read(&path).unwrap();
+        mcap::read::MessageStream::new_with_options(
+            &bytes,
+            mcap::read::Options::IgnoreEndMagic.into(),
+        )
+        .map_or(0, |stream| stream.map_while(Result::ok).count())
+    };
+    while readable() < 3 {
+        assert!(std::time::Instant::now() < end, "nothing became readable");
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    drop(log);
 }

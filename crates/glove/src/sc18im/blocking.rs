@@ -9,6 +9,9 @@ use heapless::Vec;
 /// How often the clock may answer the same time in a row before it counts as stopped.
 const STOPPED_AFTER: u32 = 10_000_000;
 
+/// How often a transaction is made whose reply is read too late each time, on a machine that stands still now and then.
+const STALLS_MAX: u8 = 3;
+
 /// Blocks until a transaction is done. Never used by the scanner.
 ///
 /// `clock` is the platform's: given when something is due (`None`: when a byte arrives), it may sleep until then or
@@ -52,8 +55,18 @@ impl<'a, S: SerialPort, C: FnMut(Option<Instant>) -> Instant> Blocking<'a, S, C>
         if !self.machine.is_up() {
             self.connect()?;
         }
+        for _ in 1..STALLS_MAX {
+            match self.run_once(&batch) {
+                Err(Error::Stalled) => {}
+                other => return other,
+            }
+        }
+        self.run_once(&batch)
+    }
+
+    fn run_once(&mut self, batch: &Batch) -> Result<crate::bus::Reply, Error> {
         let now = (self.clock)(Some(Instant::from_ticks(0)));
-        self.machine.start(&batch, now)?;
+        self.machine.start(batch, now)?;
         let mut stopped = Stopped::default();
         loop {
             let now = (self.clock)(self.machine.next_due());

@@ -1,6 +1,6 @@
 //! Getting into step with the chip, and finding out why a reply fell short.
 //!
-//! Up: left alone until due → asked for its status → I²C clock written and read back → ready. A short reply: the line
+//! Up: left alone until due → asked for its status (and told the port's speed, [`super::speed`]) → I²C clock written and read back → ready. A short reply: the line
 //! falls quiet → asked for its status → ready with the reason, or down.
 
 use super::command::{self, Command, Expected};
@@ -12,16 +12,14 @@ use crate::timing::{self, after};
 impl<S: SerialPort> Sc18im<S> {
     /// Leaves the chip alone for its idle timeout; longer once it counts as dead.
     pub(super) fn go_down(&mut self, now: Instant, tries: u8) {
-        if !matches!(
-            self.state,
-            State::Down { .. } | State::Probe { .. } | State::Setup { .. }
-        ) {
+        if self.tries().is_none() {
             self.counters.resyncs = self.counters.resyncs.wrapping_add(1);
         }
-        let wait = if tries >= timing::RESYNC_TRIES {
-            timing::DEAD_RETRY
-        } else {
-            timing::IDLE_TIMEOUT
+        let wait = match (tries >= timing::RESYNC_TRIES, self.finds_speed()) {
+            (false, _) => timing::IDLE_TIMEOUT,
+            (true, false) => timing::DEAD_RETRY,
+            // At each of two speeds as often.
+            (true, true) => timing::DEAD_RETRY / 2,
         };
         self.state = State::Down {
             due: after(now, wait),
@@ -35,7 +33,7 @@ impl<S: SerialPort> Sc18im<S> {
         self.send(&command::STATUS)?;
         Ok(after(
             now,
-            timing::reply(command::STATUS.len(), 1, 0, self.config.baud),
+            timing::reply(command::STATUS.len(), 1, 0, self.line_baud),
         ))
     }
 
@@ -47,16 +45,22 @@ impl<S: SerialPort> Sc18im<S> {
     ) -> Result<Option<Reply>, Error> {
         self.pump(0)?;
         if now >= due {
-            let deadline = self.ask_status(now)?;
-            let answered = timing::serial(command::STATUS.len() + 1, self.config.baud);
-            let settled = after(now, answered + timing::QUIET);
-            self.state = State::Probe {
-                settled,
-                deadline,
-                tries,
-            };
+            self.tune_for_try(tries);
+            self.begin_probe(tries, now)?;
         }
         Ok(None)
+    }
+
+    /// Asks whether the chip is in step.
+    pub(super) fn begin_probe(&mut self, tries: u8, now: Instant) -> Result<(), Error> {
+        let deadline = self.ask_status(now)?;
+        let answered = timing::serial(command::STATUS.len() + 1, self.line_baud);
+        self.state = State::Probe {
+            settled: after(now, answered + timing::QUIET),
+            deadline,
+            tries,
+        };
+        Ok(())
     }
 
     pub(super) fn poll_probe(
@@ -68,7 +72,7 @@ impl<S: SerialPort> Sc18im<S> {
     ) -> Result<Option<Reply>, Error> {
         self.pump(REPLY_MAX)?;
         if self.in_step() && now >= settled {
-            self.begin_setup(tries, now)?;
+            self.answered(tries, now)?;
         } else if now >= deadline {
             self.go_down(now, tries.saturating_add(1));
         }
@@ -93,7 +97,7 @@ impl<S: SerialPort> Sc18im<S> {
         }
         self.received.clear();
         self.send(&command)?;
-        let wait = timing::reply(command.len(), values.len(), 0, self.config.baud);
+        let wait = timing::reply(command.len(), values.len(), 0, self.line_baud);
         self.state = State::Setup {
             deadline: after(now, wait),
             tries,

@@ -319,15 +319,51 @@ fn a_reply_in_single_bytes_just_within_the_deadline_is_taken() {
 }
 
 #[test]
-fn a_caller_that_comes_late_still_gets_a_reply_that_was_in_time() {
+fn a_reply_that_lay_unread_past_its_deadline_is_thrown_away_and_the_next_is_its_own() {
     let (mut machine, port) = up();
     port.expect([exchange(&[0x53, 0x51, 0x01, 0x50], &[7])]);
     machine
         .start(&one(Transaction::read(0x28, 1)), port.now())
         .unwrap();
+    let deadline = machine.next_due().unwrap();
     port.wait(None);
-    let much_later = Instant::from_ticks(port.now().as_ticks() + 5_000_000);
-    assert_eq!(machine.poll(much_later).unwrap().unwrap().as_slice(), [7]);
+    // The caller stands still until the very deadline, and longer.
+    port.wait(Some(deadline));
+    assert_eq!(machine.poll(port.now()), Some(Err(Error::Stalled)));
+    assert_eq!(machine.counters().stalled, 1);
+    port.expect([exchange(&[0x53, 0x51, 0x01, 0x50], &[8])]);
+    let again = run(&mut machine, &port, &one(Transaction::read(0x28, 1)));
+    assert_eq!(again.unwrap().as_slice(), [8]);
+}
+
+#[test]
+fn a_reply_read_late_but_before_its_deadline_is_taken() {
+    let (mut machine, port) = up();
+    port.expect([exchange(&[0x53, 0x51, 0x01, 0x50], &[7])]);
+    machine
+        .start(&one(Transaction::read(0x28, 1)), port.now())
+        .unwrap();
+    let before = machine.next_due().unwrap().as_ticks() - 1;
+    port.wait(None);
+    let late = Instant::from_ticks(before);
+    assert_eq!(machine.poll(late).unwrap().unwrap().as_slice(), [7]);
+}
+
+#[test]
+fn however_much_lies_in_the_port_before_a_question_none_of_it_is_the_answer() {
+    let (mut machine, port) = up();
+    port.inject(0, &[0xAA; 3_000]);
+    port.expect([exchange(&[0x53, 0x51, 0x02, 0x50], &[1, 2])]);
+    let reply = run(&mut machine, &port, &one(Transaction::read(0x28, 2)));
+    assert_eq!(reply.unwrap().as_slice(), [1, 2]);
+    assert_eq!(machine.counters().stray, 3_000);
+    // More than any system's buffer holds is a line that babbles: nothing is asked on it.
+    port.inject(0, &[0xAA; 9_000]);
+    assert_eq!(
+        machine.start(&one(Transaction::read(0x28, 2)), port.now()),
+        Err(Error::NoAnswer)
+    );
+    assert!(!machine.is_up());
 }
 
 #[test]

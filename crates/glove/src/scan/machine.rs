@@ -100,7 +100,12 @@ impl<B: Bus> BusScanner<B> {
         if result.is_err() {
             self.mux.forget();
         }
-        match self.job.take()? {
+        let job = self.job.take()?;
+        if result == Err(Error::Stalled) {
+            self.ask_again(job, now);
+            return None;
+        }
+        match job {
             Job::Sample {
                 sensor,
                 stamp,
@@ -117,6 +122,17 @@ impl<B: Bus> BusScanner<B> {
                 self.take_step(result.as_deref().map_err(|e| *e));
                 None
             }
+        }
+    }
+
+    /// Nobody looked at the bus for so long that the reply says nothing about now: it is asked for anew. A scan begins anew as
+    /// a whole, since the samples it has are as old; a step makes its transaction again by itself.
+    fn ask_again(&mut self, job: Job, now: Instant) {
+        if let (Job::Sample { .. }, Phase::Reading { .. }) = (job, self.phase) {
+            self.phase = Phase::Reading {
+                next: 0,
+                began: now,
+            };
         }
     }
 

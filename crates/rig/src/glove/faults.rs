@@ -81,6 +81,21 @@ impl VirtualGlove {
         lock(&self.state).bridge.reset(now);
     }
 
+    /// Switches the glove's power off, in whatever it is doing: it is silent and deaf. Or on again at `now`: the serial bridge
+    /// is as after a reset (9,600 baud, `OK`), the multiplexer has no channel connected, every sensor boots for 650 ms, in
+    /// CONFIG mode after that.
+    pub fn power(&self, on: bool, now: Instant) {
+        let mut state = lock(&self.state);
+        state.off = !on;
+        if on {
+            state.bridge.reset(now);
+            state.bus.channels = 0;
+            for chip in &mut state.bus.sensors {
+                chip.reset_and_boot(now);
+            }
+        }
+    }
+
     /// Cuts the next `count` answers to `bytes` bytes.
     pub fn cut_answers(&self, bytes: usize, count: u32) {
         lock(&self.state).bridge.short_answers = (bytes, count);

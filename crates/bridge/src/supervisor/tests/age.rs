@@ -32,7 +32,7 @@ fn a_sample_of_exactly_100_ms_serves_and_one_microsecond_more_does_not() {
             ..bench
         };
         copy.now = bench.now + age;
-        copy.inputs.heartbeat = Some(at(copy.now));
+        copy.inputs.clutch = closed(at(copy.now));
         copy.inputs.status.as_mut().unwrap().stamp = at(copy.now);
         // No stall: a step in between.
         let now = copy.now;
@@ -72,7 +72,7 @@ fn the_clutch_opens_250_ms_after_the_last_heartbeat() {
 fn a_release_holds_in_the_next_step() {
     let mut bench = following();
     bench.beating = false;
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     assert_eq!(bench.tick().state, State::Idle);
 }
 
@@ -121,7 +121,7 @@ fn a_release_ends_the_opening_where_the_gripper_is() {
     bench.beating = false;
     bench.until(|state| state == State::SafeAction(HoldReason::HeartbeatLost));
     bench.ticks(100);
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     let output = bench.tick();
     assert_eq!(output.motion.unwrap().position, bench.status().position);
     let stays = bench.ticks(100).motion.unwrap().position;

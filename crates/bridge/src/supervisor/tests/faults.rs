@@ -17,7 +17,7 @@ fn a_fault_ends_motion_until_the_clutch_is_opened_and_the_fault_is_gone() {
         "the person has not opened the clutch"
     );
     bench.beating = false;
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     assert_eq!(bench.tick().state, State::Idle);
     bench.beating = true;
     bench.until(|state| state == State::Following);
@@ -140,7 +140,7 @@ fn stamps_and_heartbeats_from_the_future_are_not_believed() {
 
     let mut bench = following();
     bench.beating = false;
-    bench.inputs.heartbeat = Some(at(bench.now + 1_000 * MS));
+    bench.inputs.clutch = closed(at(bench.now + 1_000 * MS));
     assert_eq!(
         bench.tick().state,
         State::Holding(HoldReason::HeartbeatLost)
@@ -165,7 +165,7 @@ fn a_command_between_two_periods_moves_no_faster() {
             if step.is_multiple_of(30 * MS / period) {
                 bench.frame(Ok(bench.output), now);
             }
-            bench.inputs.heartbeat = Some(at(now));
+            bench.inputs.clutch = closed(at(now));
             bench.step();
         }
         from - bench.last.unwrap().motion.unwrap().position[0]

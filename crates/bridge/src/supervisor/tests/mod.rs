@@ -3,11 +3,13 @@
 extern crate std;
 
 use super::*;
+use crate::clutch::Clutch;
 use crate::config::{SafeAction, Settings};
 use gripper::Contact;
 use std::vec::Vec;
 
 mod age;
+mod doubt;
 mod faults;
 mod start;
 mod targets;
@@ -28,6 +30,11 @@ struct Bench {
     speed: u8,
     sent: Vec<(u64, [u8; 4])>,
     last: Option<Output<4>>,
+}
+
+/// A clutch whose newest heartbeat came at `beat`.
+fn closed(beat: Instant) -> Clutch {
+    Clutch::Closed { epoch: 0, beat }
 }
 
 fn at(us: u64) -> Instant {
@@ -53,7 +60,7 @@ impl Bench {
             now: 1_000 * MS,
             supervisor: Supervisor::new(Config::new(settings).unwrap()),
             inputs: Inputs {
-                heartbeat: None,
+                clutch: Clutch::Open,
                 hand: None,
                 status: Some(status([10, 20, 30, 137])),
                 weights: Weights::Ready,
@@ -83,7 +90,7 @@ impl Bench {
             self.frame(Ok(self.output), now - 5 * MS);
         }
         if self.beating {
-            self.inputs.heartbeat = Some(at(now));
+            self.inputs.clutch = closed(at(now));
         }
         self.step()
     }

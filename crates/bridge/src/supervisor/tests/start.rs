@@ -41,7 +41,7 @@ fn a_hold_repeats_the_echo_in_contact_and_the_position_elsewhere() {
     bench.ticks(30);
     bench.status().contact[1] = Contact::ContactClosing;
     bench.beating = false;
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     let echo = bench.status().echo;
     let output = bench.tick();
     let position = bench.status().position;
@@ -60,7 +60,7 @@ fn an_axis_that_meets_something_while_held_keeps_pressing_as_it_did() {
     let mut bench = following();
     bench.output = [20.0; 4];
     bench.ticks(10);
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     bench.beating = false;
     let pressed = bench.status().echo[0];
     bench.tick();
@@ -215,7 +215,7 @@ fn engaging_again_blends_from_where_the_gripper_is_then() {
     bench.speed = 10;
     bench.ticks(100);
     bench.beating = false;
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     bench.ticks(100);
     bench.output = [0.0, 0.0, 0.0, 0.0];
     bench.beating = true;

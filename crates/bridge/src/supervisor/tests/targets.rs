@@ -39,10 +39,14 @@ fn a_held_axis_that_is_pushed_away_is_given_up_to_the_lead() {
     let mut bench = following();
     bench.speed = 0;
     bench.beating = false;
-    bench.inputs.heartbeat = None;
+    bench.inputs.clutch = Clutch::Open;
     let held = bench.ticks(5).motion.unwrap().position;
-    bench.status().position[0] = held[0] - 60;
-    let pushed = bench.tick().motion.unwrap().position;
+    // By hand, not faster than a finger moves.
+    let mut pushed = held;
+    for by in 1..=60 {
+        bench.status().position[0] = held[0] - by;
+        pushed = bench.tick().motion.unwrap().position;
+    }
     assert_eq!(pushed[0], held[0] - 20);
     assert_eq!(pushed[1..], held[1..]);
 }
@@ -191,7 +195,7 @@ fn every_way_through_the_configuration_space_ends_at_its_goal() {
                     position[axis],
                 )
             });
-            command = limits::keep_inside(wanted, &position, &goal);
+            command = limits::keep_inside(wanted, &position, &position, &goal);
             for axis in 0..4 {
                 assert!(command[axis].abs_diff(position[axis]) <= 40);
                 position[axis] = command[axis]
@@ -218,7 +222,7 @@ fn a_gripper_of_one_axis_has_no_configuration_space_and_all_the_other_limits() {
     for step in 1..400u64 {
         let now = at(step * 10 * MS);
         let inputs = Inputs {
-            heartbeat: Some(now),
+            clutch: closed(now),
             hand: Some(Hand {
                 sequence: step as u32,
                 stamp: now,

@@ -83,7 +83,11 @@ pub(super) fn next_command<const X: usize>(
         }
     });
     match axes {
-        Axes::Each => limits::keep_inside(wanted, &status.position, &target.map(f32::from)),
+        Axes::Each => {
+            // By now it may be as far as what it was told before.
+            let ceiling = core::array::from_fn(|axis| status.position[axis].max(status.echo[axis]));
+            limits::keep_inside(wanted, &ceiling, &status.position, &target.map(f32::from))
+        }
         // The mode keeps fingers and scissor apart.
         Axes::Fingers | Axes::Scissor => wanted,
     }

@@ -1,0 +1,135 @@
+//! What the gripper says is doubted where it cannot be.
+
+use super::*;
+
+/// Steps with positions of this status that are not true; the gripper itself goes on as before.
+fn lie(
+    bench: &mut Bench,
+    lies: impl Fn(usize, [u8; 4]) -> [u8; 4],
+    steps: usize,
+) -> Vec<Output<4>> {
+    (0..steps)
+        .map(|step| {
+            bench.now += 10 * MS;
+            let now = bench.now;
+            bench.answer(now);
+            bench.frame(Ok(bench.output), now - 5 * MS);
+            bench.inputs.clutch = closed(at(now));
+            let truth = bench.status().position;
+            bench.status().position = lies(step, truth);
+            let output = bench.supervisor.step(at(now), &bench.inputs);
+            bench.status().position = truth;
+            if let Some(motion) = output.motion {
+                bench.status().echo = motion.position;
+            }
+            output
+        })
+        .collect()
+}
+
+fn farthest(outputs: &[Output<4>], from: [u8; 4]) -> u8 {
+    let far = |output: &Output<4>| {
+        let motion = output.motion?;
+        (0..4)
+            .map(|axis| motion.position[axis].abs_diff(from[axis]))
+            .max()
+    };
+    outputs.iter().filter_map(far).max().unwrap_or(0)
+}
+
+#[test]
+fn one_position_that_jumps_by_100_moves_no_command() {
+    let mut bench = following();
+    bench.ticks(300);
+    let before = bench.status().position;
+    let outputs = lie(
+        &mut bench,
+        |step, truth| {
+            if step == 3 {
+                truth.map(|x| x.saturating_add(100))
+            } else {
+                truth
+            }
+        },
+        20,
+    );
+    assert!(
+        outputs
+            .iter()
+            .all(|output| output.state == State::Following)
+    );
+    assert!(farthest(&outputs, before) <= 2, "{outputs:?}");
+}
+
+#[test]
+fn positions_that_jump_again_and_again_hold_and_are_a_named_fault() {
+    let mut bench = following();
+    bench.ticks(300);
+    let before = bench.status().position;
+    let outputs = lie(
+        &mut bench,
+        |step, truth| truth.map(|x| x ^ if step % 2 == 0 { 0x80 } else { 0xC0 }),
+        100,
+    );
+    assert!(matches!(
+        outputs[3].state,
+        State::Faulted(GripperFault::Implausible { .. })
+    ));
+    assert!(farthest(&outputs, before) <= 2, "{outputs:?}");
+    // Opened and closed again by a person, and the positions true again: it follows.
+    bench.beating = false;
+    bench.inputs.clutch = Clutch::Open;
+    bench.ticks(5);
+    bench.beating = true;
+    bench.until(|state| state == State::Following);
+}
+
+#[test]
+fn an_echo_that_stays_what_it_was_is_a_fault_within_two_seconds() {
+    let mut bench = following();
+    let stuck = bench.status().echo;
+    let start = bench.now;
+    bench.output = [30.0, 40.0, 50.0, 200.0];
+    loop {
+        bench.now += 10 * MS;
+        let now = bench.now;
+        // It goes nowhere, and answers.
+        bench.status().stamp = at(now);
+        bench.status().echo = stuck;
+        bench.frame(Ok(bench.output), now - 5 * MS);
+        bench.inputs.clutch = closed(at(now));
+        let output = bench.supervisor.step(at(now), &bench.inputs);
+        if output.state == State::Faulted(GripperFault::CommandIgnored) {
+            break;
+        }
+        assert!(now - start < 2_000 * MS, "still {:?}", output.state);
+    }
+}
+
+#[test]
+fn an_axis_that_stands_although_it_is_told_to_move_is_told_within_two_seconds() {
+    let mut bench = following();
+    bench.ticks(300);
+    bench.speed = 0;
+    bench.status().contact = [Contact::Moving; 4];
+    bench.output = [30.0, 40.0, 50.0, 200.0];
+    let start = bench.now;
+    while bench.tick().stands.is_none() {
+        assert!(bench.now - start < 2_000 * MS);
+    }
+    // A software limit is none: there it says that it is at its position.
+    bench.status().contact = [Contact::AtPosition; 4];
+    assert_eq!(bench.ticks(300).stands, None);
+}
+
+#[test]
+fn nothing_is_commanded_from_a_first_status_that_no_second_one_confirms() {
+    let mut bench = Bench::new(Settings::default());
+    bench.beating = true;
+    bench.status().position = [200; 4];
+    let first = bench.tick();
+    assert_eq!(
+        (first.motion, first.state),
+        (None, State::Holding(HoldReason::GripperSilent))
+    );
+}

@@ -1,0 +1,54 @@
+//! Opening the clutch of a bridge on a chip, and seeing that the gripper is held.
+
+use std::time::{Duration, Instant};
+
+use bridge::State;
+use gripper::Activation;
+
+use crate::host_link::{Error, HostLink};
+use crate::stopped::{HOLD_WAIT, Stopped};
+
+/// Between two looks.
+const PAUSE: Duration = Duration::from_millis(30);
+/// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.
+const STATUSES: u32 = 3;
+
+/// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on.
+pub(super) fn stop(link: &mut HostLink) -> Stopped {
+    match confirmed(link) {
+        Ok(stopped) => stopped,
+        Err(_) => Stopped::Unheard,
+    }
+}
+
+fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
+    link.release()?;
+    let at_release = link.counters()?;
+    if at_release.commands == 0 {
+        return Ok(Stopped::Untouched);
+    }
+    let end = Instant::now() + Duration::from_micros(HOLD_WAIT.as_micros());
+    let mut command = None;
+    loop {
+        for sample in link.listen(PAUSE)? {
+            // What the gripper is told now that the clutch is open.
+            command = (sample.state == State::Idle).then_some(sample.command);
+        }
+        let status = link.status()?;
+        let counters = link.counters()?;
+        let answered = counters.statuses.wrapping_sub(at_release.statuses) >= STATUSES;
+        if let (Some(gripper), State::Idle, true) = (&status.gripper, status.state, answered) {
+            if gripper.activation == Activation::Activating {
+                return Ok(Stopped::Activating);
+            }
+            // Told nothing: it goes nowhere by itself, and writing could start it.
+            let silent = command.as_ref().is_some_and(|command| command.is_empty());
+            if silent || command.as_ref() == Some(&gripper.echo) {
+                return Ok(Stopped::Held);
+            }
+        }
+        if Instant::now() >= end {
+            return Ok(Stopped::NotConfirmed);
+        }
+    }
+}

@@ -1,0 +1,151 @@
+//! The view on a small terminal: lines without boxes, what matters most first, each part whole or not at all.
+
+use ratatui::Frame;
+use ratatui::style::{Color, Style};
+use ratatui::text::{Line, Span};
+use ratatui::widgets::Paragraph;
+
+use super::draw::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines};
+use super::view::{View, count, old};
+use crate::stats::short_or_dash;
+
+/// The least terminal that shows state, faults and axes: columns, rows.
+pub const LEAST: (u16, u16) = (30, 7);
+/// The least columns for the table of the hand's angles.
+const TABLE: u16 = 58;
+
+/// Draws what fits.
+pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
+    let area = frame.area();
+    let lines = if area.width < LEAST.0 || area.height < LEAST.1 {
+        too_small(view)
+    } else {
+        lines(view, area.width, area.height.into())
+    };
+    frame.render_widget(Paragraph::new(lines), area);
+}
+
+/// The state is said even here.
+fn too_small(view: &View) -> Vec<Line<'_>> {
+    let (width, height) = LEAST;
+    vec![
+        Line::raw(view.state.as_str()),
+        Line::styled(
+            format!("too small: {width}×{height} at least"),
+            Style::new().fg(Color::Red),
+        ),
+    ]
+}
+
+fn lines(view: &View, width: u16, height: usize) -> Vec<Line<'_>> {
+    let axes = axes(view, width);
+    let keys = key_lines(view, width);
+    // State, axes, and two lines for what is wrong are always there; what is left goes to the others in this order.
+    let mut room = height.saturating_sub(1 + axes.len() + 2);
+    let mut fit = |part: Vec<Line<'static>>| {
+        if part.len() > room {
+            return Vec::new();
+        }
+        room -= part.len();
+        part
+    };
+    let keys = fit(keys);
+    let rates = fit(rates(view, width));
+    let hand = if width >= TABLE && room_for_table(view, room) {
+        let table = hand_table(view, width);
+        room -= table.len();
+        table
+    } else if room > 0 {
+        room -= 1;
+        vec![hand_line(view)]
+    } else {
+        Vec::new()
+    };
+    let mut lines = vec![heading(view)];
+    lines.extend(hand);
+    lines.extend(axes);
+    lines.extend(rates);
+    lines.extend(fault_lines(view, width, 2 + room));
+    lines.extend(keys);
+    lines
+}
+
+fn room_for_table(view: &View, room: usize) -> bool {
+    room > view.fingers.len()
+}
+
+fn axes(view: &View, width: u16) -> Vec<Line<'static>> {
+    let live = view.gripper_age.is_none();
+    let bars = usize::from(width).saturating_sub(40).clamp(5, 80);
+    view.axes
+        .iter()
+        .map(|axis| {
+            let mut spans = vec![Span::styled(
+                format!("{:<9}", axis.name),
+                if live { BOLD } else { DIM },
+            )];
+            spans.extend(bar(axis, bars, live));
+            let numbers = format!(" {:>3}→{:<3} ", count(axis.asked), count(axis.reached));
+            spans.push(Span::raw(numbers));
+            spans.push(Span::styled(axis.word, DIM));
+            Line::from(spans)
+        })
+        .collect()
+}
+
+fn rates(view: &View, width: u16) -> Vec<Line<'static>> {
+    let text = format!(
+        "glove {:.0}/s gripper {:.0}/s p99 {} dropped {}",
+        view.frames_per_s,
+        view.cycles_per_s,
+        short_or_dash(view.latency_p99),
+        view.dropped,
+    );
+    wrapped(&text, width).into_iter().map(Line::raw).collect()
+}
+
+/// How far each finger is bent at its base, degrees.
+fn hand_line(view: &View) -> Line<'static> {
+    let mut spans = vec![match old(view.hand_age) {
+        Some(age) => Span::styled(format!("{age} "), Style::new().fg(Color::Red)),
+        None => Span::styled("flex ", DIM),
+    }];
+    for finger in &view.fingers {
+        let style = if finger.good {
+            Style::new()
+        } else {
+            Style::new().fg(Color::Red)
+        };
+        let name: String = finger.name.chars().take(1).collect();
+        let flex = finger.angles[0].to_degrees();
+        spans.push(Span::styled(format!("{name}{flex:>3.0}° "), style));
+    }
+    Line::from(spans)
+}
+
+/// `text` in lines of at most `width` columns, broken between words; a longer word is broken where it must be.
+pub(super) fn wrapped(text: &str, width: u16) -> Vec<String> {
+    let width = usize::from(width).max(1);
+    let mut lines: Vec<String> = Vec::new();
+    let mut line = String::new();
+    let mut length = 0;
+    for word in text.split_inclusive(' ') {
+        let letters = word.trim_end().chars().count();
+        if length > 0 && length + letters > width {
+            lines.push(std::mem::take(&mut line).trim_end().to_owned());
+            length = 0;
+        }
+        for letter in word.chars() {
+            if length == width && letter != ' ' {
+                lines.push(std::mem::take(&mut line));
+                length = 0;
+            }
+            if length < width {
+                line.push(letter);
+                length += 1;
+            }
+        }
+    }
+    lines.push(line.trim_end().to_owned());
+    lines
+}

@@ -1,0 +1,228 @@
+//! What a person is shown of a run: the numbers of one moment, what is wrong now, and for as long as it is.
+
+use std::collections::VecDeque;
+use std::time::{Duration, Instant};
+
+use bridge::State;
+use bridge::event::Kind;
+use glove::hand::LIMITS;
+use glove::scan::Health;
+use gripper::{Activation, Contact, Status};
+
+use super::replies::Replies;
+use crate::live::{Axis, Finger};
+use crate::realtime::Scheduling;
+use crate::record::AXES;
+use crate::session::Snapshot;
+use crate::words;
+
+/// Faults shown at once.
+const SHOWN_FAULTS: usize = 5;
+/// How long a fault stays on the view after it happened, unless its reason goes before.
+const FAULT_SHOWN: Duration = Duration::from_secs(4);
+/// What is older is marked as old, µs.
+const OLD_US: u64 = 250_000;
+/// An axis whose position stays the same for so long stands.
+const STANDS: Duration = Duration::from_millis(300);
+/// Late steps of so many last seconds say that the computer is busy.
+const BUSY: Duration = Duration::from_secs(5);
+
+/// What is remembered from moment to moment.
+#[derive(Debug, Default)]
+pub(super) struct Shown {
+    recent: VecDeque<(Instant, String, Kind)>,
+    replies: Replies,
+    /// Each axis' position, and when it changed last.
+    positions: [Option<(u8, Instant)>; AXES],
+    /// Late steps as they were when they last grew.
+    late: (u32, Option<Instant>),
+}
+
+impl Shown {
+    /// A fault happened. The same thing again only renews what is shown.
+    pub(super) fn fault(&mut self, text: &str, kind: Kind) {
+        self.recent.retain(|(_, known, _)| known != text);
+        self.recent
+            .push_back((Instant::now(), text.to_owned(), kind));
+        if self.recent.len() > SHOWN_FAULTS {
+            self.recent.pop_front();
+        }
+    }
+
+    /// A status came.
+    pub(super) fn status(&mut self, status: &Status<AXES>, now: Instant) {
+        for (known, position) in self.positions.iter_mut().zip(status.position) {
+            if known.is_none_or(|(before, _)| before != position) {
+                *known = Some((position, now));
+            }
+        }
+    }
+
+    /// What is wrong, and what was a moment ago.
+    pub(super) fn faults(
+        &mut self,
+        snapshot: &Snapshot,
+        scheduling: Scheduling,
+        now: Instant,
+    ) -> Vec<String> {
+        let mut faults = standing(snapshot);
+        faults.extend(self.replies.look(now, &snapshot.counters.gripper));
+        faults.extend(self.busy(snapshot, scheduling, now));
+        self.recent.retain(|(at, _, kind)| {
+            now.saturating_duration_since(*at) < FAULT_SHOWN && !over(kind, snapshot)
+        });
+        faults.extend(self.recent.iter().map(|(_, text, _)| text.clone()));
+        faults
+    }
+
+    /// A word for the person whose motion is held because this computer is busy.
+    fn busy(
+        &mut self,
+        snapshot: &Snapshot,
+        scheduling: Scheduling,
+        now: Instant,
+    ) -> Option<String> {
+        let steps = snapshot.counters.late_steps;
+        let (known, grew) = &mut self.late;
+        if steps != *known {
+            // What came late before anybody looked is no news.
+            *grew = (*known > 0 || steps > 0).then_some(now);
+            *known = steps;
+        }
+        let held = matches!(snapshot.state, State::Holding(_) | State::SafeAction(_));
+        let recently = grew.is_some_and(|at| now.saturating_duration_since(at) < BUSY);
+        (held && recently).then(|| {
+            let help = match scheduling {
+                Scheduling::Realtime => "",
+                Scheduling::Shared => {
+                    ", or allow this user real-time priority (docs/tool.md, `rtprio`)"
+                }
+            };
+            format!(
+                "this computer is too busy: {steps} steps came late so far; close other programs{help}"
+            )
+        })
+    }
+
+    /// The gripper's axes, and what each does.
+    pub(super) fn axes(&self, snapshot: &Snapshot, now: Instant) -> Vec<Axis> {
+        (0..AXES)
+            .map(|axis| Axis {
+                name: words::AXIS_WORDS[axis],
+                asked: snapshot.command.map(|motion| motion.position[axis]),
+                reached: snapshot.status.map(|status| status.position[axis]),
+                word: self.word(snapshot, axis, now),
+            })
+            .collect()
+    }
+
+    fn word(&self, snapshot: &Snapshot, axis: usize, now: Instant) -> &'static str {
+        let Some(status) = &snapshot.status else {
+            return "silent";
+        };
+        if gripper_age(snapshot).is_some() {
+            return "silent, position old";
+        }
+        let stands = self.positions[axis]
+            .is_none_or(|(_, since)| now.saturating_duration_since(since) >= STANDS);
+        match status.contact[axis] {
+            // The gripper says so of an axis, too, that it was never told to move.
+            Contact::Moving if stands => "stands",
+            contact => words::contact(contact),
+        }
+    }
+}
+
+/// Age of the gripper's newest status in seconds, where it is old.
+pub(super) fn gripper_age(snapshot: &Snapshot) -> Option<f32> {
+    let status = snapshot.status.as_ref()?;
+    old(snapshot
+        .now
+        .checked_duration_since(status.stamp)?
+        .as_ticks())
+}
+
+/// Age of the glove's newest sample in seconds, where it is old.
+pub(super) fn glove_age(snapshot: &Snapshot) -> Option<f32> {
+    let frame = snapshot.frame.as_ref()?;
+    let newest = frame.samples.iter().map(|sample| sample.stamp).max()?;
+    old(snapshot.now.checked_duration_since(newest)?.as_ticks())
+}
+
+fn old(us: u64) -> Option<f32> {
+    (us >= OLD_US).then_some(us as f32 / 1e6)
+}
+
+/// Whether the reason of a fault is gone.
+fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
+    match kind {
+        Kind::State { to, .. } => snapshot.state.name() != to.name(),
+        Kind::SensorLost { segment } => snapshot.frame.as_ref().is_some_and(|frame| {
+            frame
+                .samples
+                .get(*segment)
+                .is_some_and(|sample| sample.health == Health::Good)
+        }),
+        Kind::Glove { .. } => snapshot.glove_answers,
+        Kind::Gripper { .. } => snapshot.gripper_answers,
+        Kind::GripperFault(_) => snapshot
+            .status
+            .is_some_and(|status| status.fault == gripper::Fault::None),
+        _ => false,
+    }
+}
+
+/// What is wrong now and stays so.
+fn standing(snapshot: &Snapshot) -> Vec<String> {
+    let mut faults = Vec::new();
+    match snapshot.state {
+        State::Holding(reason) | State::SafeAction(reason) => {
+            faults.push(format!("held: {reason}"));
+        }
+        State::Faulted(_) => faults.push(format!(
+            "{}: open the clutch, mend it, and close the clutch again",
+            snapshot.state
+        )),
+        State::Idle | State::Blending | State::Following => {}
+    }
+    if let Some(frame) = &snapshot.frame {
+        let health = frame.samples.map(|sample| sample.health);
+        faults.extend(words::lost_sensors(&health));
+    }
+    if let Some(status) = &snapshot.status {
+        if status.fault != gripper::Fault::None {
+            faults.push(format!(
+                "gripper fault {:02X}: {}; {}",
+                status.fault.code(),
+                status.fault.sentence(),
+                status.fault.action()
+            ));
+        }
+        if status.activation != Activation::Ready {
+            faults.push(format!(
+                "the gripper is {}",
+                words::activation(status.activation)
+            ));
+        }
+    }
+    faults
+}
+
+/// The fingers of the hand.
+pub(super) fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
+    let good = match &snapshot.frame {
+        Some(frame) => frame.samples.map(|sample| sample.health == Health::Good),
+        None => [false; glove::hand::SEGMENT_COUNT],
+    };
+    let good = words::fingers_good(&good);
+    words::FINGER_NAMES
+        .iter()
+        .enumerate()
+        .map(|(finger, name)| Finger {
+            name,
+            angles: core::array::from_fn(|joint| snapshot.angles[5 * finger + joint]),
+            limits: core::array::from_fn(|joint| LIMITS[5 * finger + joint]),
+            good: good[finger],
+        })
+        .collect()
+}

@@ -1,0 +1,39 @@
+//! A glove on a PC's port whose power is cut in mid-session, in real time.
+
+use std::time::{Duration, Instant};
+
+use gauntlet::platform::Clock;
+use gauntlet::port::{BAUD, Port};
+use glove::scan::{Config, Scanner};
+use rig::glove::VirtualGlove;
+use rig::pty::PtyDevice;
+
+#[test]
+fn a_power_cycled_glove_comes_back_on_its_port_by_itself() {
+    let still = |_: f64| [0.0; 25];
+    let glove = VirtualGlove::new(Box::new(still), rig::glove::Config::at_baud(BAUD));
+    let device = PtyDevice::spawn(Box::new(glove.clone()), None).expect("a pseudo-terminal");
+    let port = Port::open(device.path(), BAUD).expect("opens");
+    let mut scanner = Scanner::new(port, Config::default()).with_set_baud(Port::set_baud);
+    let clock = Clock::start();
+    let mut whole = |wanted: u16, limit: Duration| {
+        let end = Instant::now() + limit;
+        while Instant::now() < end {
+            if scanner
+                .poll(clock.now())
+                .is_some_and(|frame| frame.good() == wanted)
+            {
+                return true;
+            }
+            std::thread::sleep(Duration::from_micros(300));
+        }
+        false
+    };
+    assert!(whole(0xFFFF, Duration::from_secs(20)), "up");
+    glove.power(false, device.clock().now());
+    assert!(!whole(0xFFFF, Duration::from_secs(1)), "without power");
+    glove.power(true, device.clock().now());
+    assert!(whole(0xFFFF, Duration::from_secs(20)), "back");
+    assert!(scanner.counters().starts.iter().all(|starts| *starts == 2));
+    assert!(scanner.link_counters().restarts >= 1);
+}
