@@ -252,9 +252,12 @@ impl Summary {
         }
         if self.too_busy() {
             lines.push(format!(
-                "computer   too busy for an even motion: {} of {} steps came late, not the devices; close other programs{}",
-                self.late_steps,
-                self.commands,
+                "computer   too busy for an even motion: {} steps came late, not the devices; close other programs{}",
+                match u64::from(self.late_steps) {
+                    // While nothing was commanded: of nothing it is no share.
+                    late if late > self.commands => late.to_string(),
+                    late => format!("{late} of {}", self.commands),
+                },
                 match self.scheduling {
                     Scheduling::Realtime => "",
                     Scheduling::Shared => ", or allow real-time priority (docs/tool.md)",
