@@ -480,6 +480,9 @@ impl Run {
             }
         }
         faults.extend(self.log_end());
+        if self.expired {
+            faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
+        }
         if let Some(snapshot) = snapshot {
             let scheduling = self.session.scheduling();
             let now = Instant::now();

@@ -156,6 +156,13 @@ impl VirtualGlove {
         lock(&self.state).bus.channels
     }
 
+    /// Whether every sensor on the bus has booted by `now`.
+    #[must_use]
+    pub fn booted(&self, now: Instant) -> bool {
+        let state = lock(&self.state);
+        !state.off && state.bus.sensors.iter().all(|chip| chip.booted(now))
+    }
+
     /// What it has counted.
     #[must_use]
     pub fn counters(&self) -> Counters {

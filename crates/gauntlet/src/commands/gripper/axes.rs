@@ -85,8 +85,7 @@ pub(super) fn next_command<const X: usize>(
     match axes {
         Axes::Each => {
             // By now it may be as far as what it was told before.
-            let ceiling =
-                core::array::from_fn(|axis| status.position[axis].max(status.echo[axis]));
+            let ceiling = core::array::from_fn(|axis| status.position[axis].max(status.echo[axis]));
             limits::keep_inside(wanted, &ceiling, &status.position, &target.map(f32::from))
         }
         // The mode keeps fingers and scissor apart.
