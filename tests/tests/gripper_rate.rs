@@ -121,7 +121,9 @@ impl Bench {
             epoch: None,
         };
         // The sensors sit straight.
-        bench.app.set_calibration(glove::hand::Calibration::identity());
+        bench
+            .app
+            .set_calibration(glove::hand::Calibration::identity());
         let end = 20_000 * MS;
         while bench.app.telemetry().state != State::Following {
             bench.step();
