@@ -2,6 +2,7 @@
 
 use crate::calibration::Try;
 use crate::{Duration, Instant, State};
+use glove::scan::Finding;
 use gripper::registers::Fault;
 
 /// Events that are kept until someone drains them. When the queue is full the oldest one goes and is counted.
@@ -41,6 +42,8 @@ pub enum Kind {
         /// Index in [`glove::hand::SEGMENT_NAMES`].
         segment: usize,
     },
+    /// What the scanner found out about the sensors.
+    Sensors(Finding),
     /// Frames come from the glove (or no longer do).
     Glove {
         /// Whether they come.
@@ -114,6 +117,7 @@ impl core::fmt::Display for Kind {
                     sensor(segment)
                 )
             }
+            Kind::Sensors(finding) => write!(f, "{finding}"),
             Kind::Glove { answers: true } => f.write_str("the glove sends frames"),
             Kind::Glove { answers: false } => {
                 f.write_str("the glove sends no frames: check its cable and power")

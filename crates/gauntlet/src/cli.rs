@@ -125,7 +125,7 @@ impl Default for Demo {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  gauntlet simulate --glove /tmp/glove --gripper /tmp/gripper
+  gauntlet simulate                                                  both, at /tmp/glove and /tmp/gripper
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
@@ -133,20 +133,21 @@ Examples:
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real
 ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0
-takes any free one and tells which. `ready` on a line of its own says that both answer.
+takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too.
+The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves.
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
-    /// Link the virtual glove here.
-    #[arg(long, value_name = "PATH", required_unless_present = "gripper")]
+    /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
+    #[arg(long, value_name = "PATH")]
     pub glove: Option<PathBuf>,
     /// Link the virtual gripper here, or let it listen at tcp:HOST:PORT.
     #[arg(long, value_name = "PATH")]
     pub gripper: Option<PathBuf>,
-    /// Which gripper it is.
-    #[arg(long, value_enum, default_value_t = crate::commands::gripper::Model::ThreeFinger, requires = "gripper")]
-    pub gripper_model: crate::commands::gripper::Model,
+    /// Which gripper it is; the 3-Finger if not said.
+    #[arg(long, value_enum)]
+    pub gripper_model: Option<crate::commands::gripper::Model>,
     /// The glove plays this recording of a hand instead of generated motion.
-    #[arg(long, value_name = "FILE.csv", requires = "glove")]
+    #[arg(long, value_name = "FILE.csv")]
     pub poses: Option<PathBuf>,
     /// Seed of the generated motion.
     #[arg(long, value_name = "N", default_value_t = 1)]

@@ -459,8 +459,12 @@ impl Run {
     /// The state, and what a person can do about it.
     fn state_words(&self, snapshot: &Snapshot, keys: bool) -> String {
         let name = snapshot.state.name();
-        if snapshot.state == bridge::State::Idle && keys && !self.clutch {
-            return format!("{name}: space closes the clutch");
+        if keys && !self.clutch {
+            match snapshot.clutch {
+                Position::Open => return format!("{name}: space closes the clutch"),
+                Position::Expired => return format!("{name}: space closes the clutch again"),
+                Position::Closed | Position::Lost => {}
+            }
         }
         name.to_owned()
     }
@@ -476,6 +480,9 @@ impl Run {
             }
         }
         faults.extend(self.log_end());
+        if self.expired {
+            faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
+        }
         if let Some(snapshot) = snapshot {
             let scheduling = self.session.scheduling();
             let now = Instant::now();

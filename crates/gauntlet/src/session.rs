@@ -412,7 +412,8 @@ fn hold_confirmed(telemetry: &Telemetry<AXES>, since: Instant) -> bool {
     };
     !sent.follows
         && sent.at >= since
-        && status.stamp > sent.at
+        // A status is as old as its request, and the request that carries the hold asks for its own.
+        && status.stamp >= sent.at
         && status.echo == sent.motion.position
 }
 
@@ -429,6 +430,8 @@ fn sort(kind: &Kind) -> Sort {
         Kind::GripperFault(fault) => *fault != gripper::Fault::None,
         Kind::SensorLost { .. }
         | Kind::SensorRestarted { .. }
+        | Kind::Sensors(_)
+        | Kind::AxisStands { .. }
         | Kind::Glove { answers: false }
         | Kind::Gripper { answers: false }
         | Kind::Calibration(Try::Refused(_))

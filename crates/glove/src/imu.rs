@@ -41,6 +41,10 @@ pub const SAMPLE_BYTES: usize = 8;
 /// Fastest turn of a hand's segment, radians a second (3,000 °/s).
 pub const FASTEST: f32 = 3_000.0 * core::f32::consts::PI / 180.0;
 
+/// Furthest turn of a hand's segment within [`timing::PEAK_SPEED`], radians (80°, what [`FASTEST`] makes in a scan at 115200
+/// baud): however many samples were lost and however slow the line, a snap by more is none of a hand.
+pub const FURTHEST: f32 = 80.0 * core::f32::consts::PI / 180.0;
+
 /// Which multiplexer channel sensor `sensor` (0 to 15) is on.
 pub const fn channel(sensor: usize) -> u8 {
     (sensor / 2) as u8 % mux::CHANNELS
@@ -97,6 +101,10 @@ pub enum Fault {
     TooFast,
     /// The same raw bytes for a while, although what it is fixed to turned.
     Frozen,
+    /// No bit of any sensor changed for a while, although they flickered before: what answers is not alive.
+    AllFrozen,
+    /// Another channel of the multiplexer gives the very same bits: at least one of the two is not what it is taken for.
+    Twin,
 }
 
 impl core::fmt::Display for Fault {
@@ -107,6 +115,8 @@ impl core::fmt::Display for Fault {
             Fault::Restarted => "sensor restarted by itself",
             Fault::TooFast => "turned faster than a hand can",
             Fault::Frozen => "frozen while the hand turned",
+            Fault::AllFrozen => "frozen together with all others",
+            Fault::Twin => "the same bits as on another channel of the multiplexer",
         })
     }
 }
@@ -215,10 +225,18 @@ pub fn angle_between(a: &Quaternion, b: &Quaternion) -> f32 {
     2.0 * libm::acosf(if dot < 1.0 { dot } else { 1.0 })
 }
 
-/// Whether a hand can turn from `a` to `b` in `elapsed`, or in one period of the fusion if that is longer.
+/// Whether a hand can turn from `a` to `b` in `elapsed`, or in one period of the fusion if that is longer: not faster than
+/// [`FASTEST`], and not by more than [`FURTHEST`] within [`timing::PEAK_SPEED`], since no hand is that fast for long.
 pub fn is_reachable(a: &Quaternion, b: &Quaternion, elapsed: Duration) -> bool {
     let micros = elapsed.as_ticks().max(timing::FUSION_PERIOD.as_ticks());
-    angle_between(a, b) <= FASTEST * (micros as f32 * 1e-6)
+    let reach = FASTEST * (micros as f32 * 1e-6);
+    let furthest = elapsed >= timing::PEAK_SPEED;
+    angle_between(a, b)
+        <= if furthest || reach < FURTHEST {
+            reach
+        } else {
+            FURTHEST
+        }
 }
 
 /// The one of q and −q that lies on the side of `previous`.

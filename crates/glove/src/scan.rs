@@ -9,7 +9,7 @@
 //! brought up again between scans, one step a scan, while the others go on.
 
 use crate::bus::Bus;
-use crate::hand::{Quaternion, SEGMENT_COUNT};
+use crate::hand::{Quaternion, SEGMENT_COUNT, SEGMENT_NAMES};
 use crate::sc18im::{self, Sc18im};
 use crate::{Duration, Instant, imu, mux};
 use sensor::Sensor;
@@ -17,6 +17,8 @@ use sensor::Sensor;
 mod frozen;
 mod machine;
 mod sensor;
+mod together;
+mod twins;
 
 /// One sensor's part of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -112,14 +114,73 @@ pub struct Counters {
     pub restarted: u32,
     /// Samples refused: too fast.
     pub too_fast: u32,
-    /// Samples refused: frozen.
+    /// Samples refused: frozen, alone or all together.
     pub frozen: u32,
+    /// Samples refused: the same bits as on another channel.
+    pub twins: u32,
+    /// Jumps that no hand makes and that stayed: each a new beginning of its sensor.
+    pub jumps: u32,
+    /// Findings that nobody took in time.
+    pub findings_lost: u32,
     /// Selections of a channel that were not confirmed.
     pub mux_errors: u32,
     /// Steps of a bring-up that failed for good.
     pub failed_starts: u32,
     /// How often each sensor came up; more than once means its heading may have started anew (calibrate again).
     pub starts: [u16; SEGMENT_COUNT],
+}
+
+/// Something the scanner found out about the sensors, told once when it begins.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Finding {
+    /// This sensor repeats its bytes although it must have turned: it is not used until they change.
+    Frozen {
+        /// Its segment.
+        segment: u8,
+    },
+    /// No bit of any sensor changes any more, although they flickered: none is used until its bytes change.
+    AllFrozen,
+    /// This sensor jumped as no hand does, and stayed there: it is used again, as a new beginning. Its heading, and with it
+    /// the calibration, is doubtful.
+    Jumped {
+        /// Its segment.
+        segment: u8,
+        /// How far, radians.
+        by: f32,
+    },
+    /// These channels of the multiplexer give the same bits (bit n: channel n): their sensors are not used while they do.
+    Twins {
+        /// The channels, two at least.
+        channels: u8,
+    },
+}
+
+/// Most findings kept for [`BusScanner::next_finding`]; one for every sensor.
+pub const FINDINGS_MAX: usize = SEGMENT_COUNT;
+
+impl core::fmt::Display for Finding {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let name = |segment: u8| SEGMENT_NAMES.get(usize::from(segment)).unwrap_or(&"?");
+        match *self {
+            Finding::Frozen { segment } => {
+                write!(f, "the sensor on {} is frozen", name(segment))
+            }
+            Finding::AllFrozen => f.write_str("all sensors are frozen: no bit changes any more"),
+            Finding::Jumped { segment, by } => write!(
+                f,
+                "the sensor on {} jumped by {:.0}°, as no hand does, and stayed there",
+                name(segment),
+                by * (180.0 / core::f32::consts::PI)
+            ),
+            Finding::Twins { channels } => {
+                f.write_str("the multiplexer's channels")?;
+                for channel in (0..mux::CHANNELS).filter(|channel| channels >> channel & 1 == 1) {
+                    write!(f, " {channel}")?;
+                }
+                f.write_str(" give the same bits: it does not select")
+            }
+        }
+    }
 }
 
 /// How the glove is wired and run.
@@ -161,6 +222,8 @@ pub struct BusScanner<B> {
     mux: mux::Mux,
     sensors: [Sensor; SEGMENT_COUNT],
     frozen: frozen::Detector,
+    twins: twins::Detector,
+    findings: heapless::Deque<Finding, FINDINGS_MAX>,
     job: Option<machine::Job>,
     step: Option<machine::ActiveStep>,
     phase: machine::Phase,
@@ -209,6 +272,8 @@ impl<B: Bus> BusScanner<B> {
             mux: mux::Mux::new(config.mux),
             sensors: core::array::from_fn(|_| Sensor::new()),
             frozen: frozen::Detector::new(),
+            twins: twins::Detector::new(),
+            findings: heapless::Deque::new(),
             job: None,
             step: None,
             phase: machine::Phase::Starting,
@@ -225,6 +290,11 @@ impl<B: Bus> BusScanner<B> {
     /// How each sensor is now, frames or not.
     pub fn health(&self) -> [Health; SEGMENT_COUNT] {
         core::array::from_fn(|k| self.sensors[k].health)
+    }
+
+    /// The oldest finding that was not taken yet. At most [`FINDINGS_MAX`] wait; a further one takes the oldest's place, counted.
+    pub fn next_finding(&mut self) -> Option<Finding> {
+        self.findings.pop_front()
     }
 
     /// The bus.

@@ -92,6 +92,16 @@ pub const FROZEN_AFTER: Duration = Duration::from_ticks(500_000);
 /// A sensor whose bytes stand still for this long has no flicker to be known by: ten periods of its fusion.
 pub const STANDSTILL: Duration = Duration::from_ticks(100_000);
 
+/// All sensors together stand still to the bit for this long: what answers is not alive. Seven scans at 115200 baud; where each
+/// sensor flickers in half of its reads, not one change in 16 · 7 reads is no chance.
+pub const ALL_FROZEN_AFTER: Duration = Duration::from_ticks(200_000);
+
+/// Nobody looked at the sensors for this long: what they did meanwhile is not known.
+pub const UNSEEN: Duration = Duration::from_ticks(200_000);
+
+/// No segment of a hand keeps its fastest speed for longer than this.
+pub const PEAK_SPEED: Duration = Duration::from_ticks(200_000);
+
 /// The frozen sensor is restarted after this long.
 pub const FROZEN_RESTART: Duration = Duration::from_ticks(1_000_000);
 

@@ -25,6 +25,9 @@ pub trait Device: Send {
     fn baud_seen(&mut self, client_baud: u32) {
         let _ = client_baud;
     }
+
+    /// Told when a client opens the port, which nobody had open.
+    fn opened(&mut self) {}
 }
 
 impl<D: Device + ?Sized> Device for Box<D> {
@@ -46,5 +49,9 @@ impl<D: Device + ?Sized> Device for Box<D> {
 
     fn baud_seen(&mut self, client_baud: u32) {
         (**self).baud_seen(client_baud);
+    }
+
+    fn opened(&mut self) {
+        (**self).opened();
     }
 }

@@ -34,8 +34,8 @@ pub struct Config {
     pub chip: Chip,
     /// Which hand wears it.
     pub side: Side,
-    /// Seed of the ±1 LSB dither on every component of every sample, which keeps a still hand from
-    /// giving the same bits for ever; `None` for exact samples.
+    /// Seed of the flicker by a digit (up to ±1 LSB on every component of every sample), as real sensors have it: a still hand
+    /// never gives the same bits for long. `None` for exact samples.
     pub dither: Option<u64>,
     /// The hand's own orientation in the world, w x y z.
     pub world: [f32; 4],
@@ -183,5 +183,9 @@ impl Device for VirtualGlove {
 
     fn baud(&self) -> u32 {
         lock(&self.state).bridge.baud()
+    }
+
+    fn opened(&mut self) {
+        lock(&self.state).hand.pose.opened();
     }
 }

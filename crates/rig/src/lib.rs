@@ -32,5 +32,5 @@ mod wire;
 pub use clock::{Clock, Duration, EventSource, Instant};
 pub use device::Device;
 pub use line::Line;
-pub use pose::{PoseSource, Recorded, RecordedError};
+pub use pose::{FLAT_S, FlatFirst, PoseSource, RISE_S, Recorded, RecordedError};
 pub use wire::{MemoryWire, WireError};

@@ -10,6 +10,53 @@ pub trait PoseSource: Send {
     /// Joint angles in radians, in the order of `glove::hand::JOINT_NAMES`, at `time_s` seconds
     /// after the clock's start.
     fn pose_at(&mut self, time_s: f64) -> [f32; 25];
+
+    /// A client has opened the glove's port, which nobody had open.
+    fn opened(&mut self) {}
+}
+
+/// How long [`FlatFirst`] lies flat, seconds: a calibration needs one of them.
+pub const FLAT_S: f64 = 3.0;
+/// How long it takes from there to the motion's beginning, seconds.
+pub const RISE_S: f64 = 1.0;
+
+/// A hand that first lies flat, so that it can be calibrated, and then moves.
+///
+/// It lies flat from when the glove's port is opened until the first sensor has been read for [`FLAT_S`], goes to the
+/// motion's beginning in [`RISE_S`], and plays the motion from there. When the port is opened anew it lies flat anew.
+pub struct FlatFirst {
+    motion: Box<dyn PoseSource>,
+    /// When it was first asked since the port was opened.
+    began: Option<f64>,
+}
+
+impl FlatFirst {
+    /// The hand that `motion` moves, flat at first.
+    #[must_use]
+    pub fn new(motion: Box<dyn PoseSource>) -> Self {
+        Self {
+            motion,
+            began: None,
+        }
+    }
+}
+
+impl PoseSource for FlatFirst {
+    fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
+        let time = time_s - *self.began.get_or_insert(time_s) - FLAT_S;
+        if !time.is_finite() || time <= 0.0 {
+            return [0.0; 25];
+        }
+        let pose = self.motion.pose_at((time - RISE_S).max(0.0));
+        let t = (time / RISE_S).min(1.0) as f32;
+        // Begins and ends gently.
+        pose.map(|angle| angle * t * t * (3.0 - 2.0 * t))
+    }
+
+    fn opened(&mut self) {
+        self.began = None;
+        self.motion.opened();
+    }
 }
 
 impl<F: FnMut(f64) -> [f32; 25] + Send> PoseSource for F {
@@ -155,6 +202,28 @@ mod tests {
 
     fn row(value: f32) -> [f32; 25] {
         [value; 25]
+    }
+
+    #[test]
+    fn a_hand_lies_flat_when_its_port_is_opened_and_goes_gently_to_its_motion() {
+        let mut hand = FlatFirst::new(Box::new(|t: f64| row(1.0 + t as f32)));
+        for _ in 0..2 {
+            assert_eq!(hand.pose_at(70.0), row(0.0));
+            assert_eq!(
+                hand.pose_at(69.99),
+                row(0.0),
+                "a period of the fusion before"
+            );
+            assert_eq!(hand.pose_at(73.0), row(0.0));
+            let mut before = hand.pose_at(73.0)[0];
+            for step in 1..=1_000 {
+                let angle = hand.pose_at(73.0 + f64::from(step) * 1e-3)[0];
+                assert!((0.0..0.002).contains(&(angle - before)), "{step}");
+                before = angle;
+            }
+            assert_eq!(hand.pose_at(74.5), row(1.5));
+            hand.opened();
+        }
     }
 
     #[test]

@@ -10,6 +10,7 @@
 //! their last bit would have passed.
 
 mod link;
+mod openers;
 
 use std::ffi::OsStr;
 use std::io;
@@ -27,11 +28,14 @@ use rustix::termios::{OptionalActions, ioctl_tiocnxcl, tcgetattr, tcsetattr};
 
 use crate::{Clock, Device, Duration, Instant, Line};
 use link::Link;
+use openers::Openers;
 
 /// Longest sleep of a device's thread.
 pub const IDLE: Duration = Duration::from_millis(20);
 /// While bytes are on their way to the client they are handed over this often.
 const GRAIN: Duration = Duration::from_micros(500);
+/// After this long without a byte from a client, nobody is in the middle of something: longer than a client's own pauses.
+const SILENT: Duration = Duration::from_secs(3);
 /// After this long without a byte from the client, a lock it may have left behind is taken off.
 const UNLOCK_AFTER: Duration = Duration::from_secs(1);
 
@@ -101,6 +105,9 @@ impl PtyDevice {
             client_end,
             shared: shared.clone(),
             last_byte: clock.now(),
+            heard: clock.now(),
+            // Without watches to be had the device only does not learn that its port is opened.
+            openers: Openers::watch(&terminal).ok(),
         };
         let thread = thread::Builder::new()
             .name("rig-pty".into())
@@ -205,15 +212,35 @@ struct Port {
     client_end: OwnedFd,
     shared: Arc<Shared>,
     last_byte: Instant,
+    /// When a client last spoke, or came.
+    heard: Instant,
+    openers: Option<Openers>,
 }
 
 impl Port {
     fn serve(mut self) -> io::Result<()> {
         while !self.shared.stop.load(Ordering::SeqCst) {
             self.shared.wakeups.fetch_add(1, Ordering::Relaxed);
+            self.meet_clients()?;
             self.take_bytes()?;
             self.give_bytes()?;
             self.sleep()?;
+        }
+        Ok(())
+    }
+
+    /// Tells the device when its port is opened.
+    fn meet_clients(&mut self) -> io::Result<()> {
+        let silent = self
+            .clock
+            .now()
+            .checked_duration_since(self.heard)
+            .is_some_and(|d| d > SILENT);
+        if let Some(openers) = &mut self.openers
+            && openers.came(silent)?
+        {
+            self.heard = self.clock.now();
+            self.line.device_mut().opened();
         }
         Ok(())
     }
@@ -237,6 +264,7 @@ impl Port {
         if count > 0 {
             self.line.write(&chunk[..count], now);
             self.last_byte = now;
+            self.heard = now;
             self.shared
                 .received
                 .fetch_add(count as u64, Ordering::Relaxed);
@@ -294,7 +322,14 @@ impl Port {
         } else {
             PollFlags::empty()
         };
-        match poll(&mut [PollFd::new(&self.master, wanted)], Some(&timeout)) {
+        let mut watched = vec![PollFd::new(&self.master, wanted)];
+        if let Some(openers) = &self.openers {
+            watched.push(PollFd::from_borrowed_fd(
+                openers.descriptor(),
+                PollFlags::IN,
+            ));
+        }
+        match poll(&mut watched, Some(&timeout)) {
             Ok(_) | Err(rustix::io::Errno::INTR) => Ok(()),
             Err(e) => Err(e.into()),
         }

@@ -326,3 +326,45 @@ fn speed_on_a_virtual_clock() {
         simulated / start.elapsed().as_secs_f64()
     );
 }
+
+/// A device that says nothing and counts how often its port was opened.
+struct Counting(std::sync::Arc<std::sync::atomic::AtomicU32>);
+
+impl rig::Device for Counting {
+    fn receive(&mut self, _: &[u8], _: rig::Instant) {}
+    fn transmit(&mut self, _: rig::Instant, _: &mut [u8]) -> usize {
+        0
+    }
+    fn next_due(&self) -> Option<rig::Instant> {
+        None
+    }
+    fn baud(&self) -> u32 {
+        115_200
+    }
+    fn opened(&mut self) {
+        self.0.fetch_add(1, std::sync::atomic::Ordering::SeqCst);
+    }
+}
+
+#[test]
+fn a_device_learns_when_its_port_is_opened_and_not_of_a_second_client() {
+    let count = std::sync::Arc::default();
+    let device = Counting(std::sync::Arc::clone(&count));
+    let handle = PtyDevice::spawn(Box::new(device), None).unwrap();
+    let seen = |wanted| {
+        std::thread::sleep(Duration::from_millis(100));
+        assert_eq!(count.load(std::sync::atomic::Ordering::SeqCst), wanted);
+    };
+    seen(0);
+    let first = Client::open(handle.path(), 115_200);
+    seen(1);
+    let second = Client::open(handle.path(), 115_200);
+    drop(first);
+    let third = Client::open(handle.path(), 115_200);
+    drop(second);
+    seen(1);
+    drop(third);
+    seen(1);
+    let _again = Client::open(handle.path(), 115_200);
+    seen(2);
+}

@@ -9,7 +9,7 @@ use crate::telemetry::{Sent, bump};
 use crate::{HIDDEN, HoldReason, Instant, timing};
 use embedded_io::{Read, ReadReady, Write};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::Frame;
+use glove::scan::{Finding, Frame};
 use gripper::registers::Fault;
 use gripper::{Gripper, Status};
 
@@ -69,6 +69,7 @@ where
         self.frame_at = Some(now);
         self.telemetry.take_frame(frame);
         self.watch_sensors(now, frame);
+        self.tell_findings(now);
         self.try_calibration(now, frame);
         let reading = self.posture.read(frame);
         self.telemetry.take_reading(&reading);
@@ -121,6 +122,17 @@ where
             {
                 self.tell(now, Kind::SensorRestarted { segment });
             }
+        }
+    }
+
+    /// Tells what the scanner found out about the sensors. One that jumped and stayed there has lost its seat or its heading:
+    /// its joints are held until the next calibration.
+    fn tell_findings(&mut self, now: Instant) {
+        while let Some(finding) = self.scanner.next_finding() {
+            if let Finding::Jumped { segment, .. } = finding {
+                self.posture.distrust(usize::from(segment));
+            }
+            self.tell(now, Kind::Sensors(finding));
         }
     }
 

@@ -50,6 +50,21 @@ pub struct Bench {
     beat: u64,
 }
 
+/// A hand that goes to `pose` as fast as a brisk one does: every joint at 10 rad/s.
+fn moving(pose: Arc<Mutex<[f32; 25]>>) -> impl Fn(f64) -> [f32; 25] + Send {
+    let shown = Mutex::new((0.0_f64, [0.0_f32; 25]));
+    move |time_s: f64| {
+        let target = *pose.lock().expect("not poisoned");
+        let mut shown = shown.lock().expect("not poisoned");
+        let most = 10.0 * (time_s - shown.0).max(0.0) as f32;
+        for (now, target) in shown.1.iter_mut().zip(target) {
+            *now = target.clamp(*now - most, *now + most);
+        }
+        shown.0 = shown.0.max(time_s);
+        shown.1
+    }
+}
+
 impl Bench {
     pub fn new(settings: Settings<4>) -> Self {
         Self::with(
@@ -66,9 +81,8 @@ impl Bench {
     ) -> Self {
         let clock = Clock::new();
         let pose = Arc::new(Mutex::new([0.0; 25]));
-        let shown = pose.clone();
         let glove = VirtualGlove::new(
-            Box::new(move |_: f64| *shown.lock().expect("not poisoned")),
+            Box::new(moving(pose.clone())),
             rig::glove::Config::at_baud(115_200),
         );
         let glove_wire = MemoryWire::new(&clock, glove.clone(), 115_200);

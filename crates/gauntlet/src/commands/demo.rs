@@ -143,7 +143,7 @@ fn devices(
 
 /// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
 pub(super) fn virtual_devices(motion: &Motion) -> Result<[Handle; 2]> {
-    let glove = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
+    let glove = VirtualGlove::new(motion.virtual_hand(), rig::glove::Config::at_baud(BAUD));
     let glove = spawn("glove", Box::new(glove))?;
     let gripper = VirtualGripper::new(rig::gripper::Config::default());
     let gripper = spawn("gripper", Box::new(gripper))?;

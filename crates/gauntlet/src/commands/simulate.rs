@@ -21,41 +21,83 @@ use crate::{probe, realtime, say, tcp};
 
 /// How often the wait for Ctrl-C looks around.
 const WATCH: Duration = Duration::from_secs(3600);
+/// How often the sensors are looked at while they boot (650 ms).
+const LOOK: Duration = Duration::from_millis(20);
+/// Where the devices are linked when no path is given.
+const GLOVE: &str = "/tmp/glove";
+const GRIPPER: &str = "/tmp/gripper";
 
 /// Runs until interrupted.
 ///
 /// # Errors
-/// A failure where a link cannot be made or a device does not answer.
+/// A failure where a link cannot be made or a device does not answer, or an option belongs to a device that is not made.
 pub(super) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
+    let [glove_place, gripper_place] = places(options)?;
+    let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
     let motion = Motion::open(options.poses.as_deref(), options.seed)?;
-    let mut glove_device = None;
-    if let Some(path) = &options.glove {
-        glove_device = Some(glove(&motion, path)?);
-        say!(
-            "glove    {}  {BAUD} baud, {}",
-            path.display(),
-            motion.describe()
-        );
+    let glove = glove_place
+        .map(|path| Glove::start(&motion, path))
+        .transpose()?;
+    if let Some(glove) = &glove {
+        let place = glove.handle.path().display();
+        say!("glove    {place}  {BAUD} baud, {}", motion.describe());
     }
-    let mut gripper_device = None;
-    if let Some(place) = &options.gripper {
-        let device = Simulated::start(place, options.gripper_model)?;
-        say!("gripper  {}", device.describe(options.gripper_model));
-        gripper_device = Some(device);
+    let gripper = gripper_place
+        .map(|place| Simulated::start(place, model))
+        .transpose()?;
+    if let Some(device) = &gripper {
+        say!("gripper  {}", device.describe(model));
     }
-    if let Some(path) = &options.glove {
-        probe::open_glove(path, interrupt)?;
+    if let Some(glove) = &glove {
+        glove.answers(interrupt)?;
     }
-    if let Some(device) = &gripper_device {
-        probe_gripper(&device.place(), options.gripper_model, interrupt)?;
+    if let Some(device) = &gripper {
+        probe_gripper(&device.place(), model, interrupt)?;
     }
     if !interrupt.asked() {
         say!("ready");
     }
     while !interrupt.sleep(WATCH) {}
     // Taking the handles down removes the links.
-    drop((glove_device, gripper_device));
+    drop((glove, gripper));
     Ok(())
+}
+
+/// Where to make the glove and the gripper: what was said, or both at their default places.
+fn places(options: &Simulate) -> Result<[Option<&Path>; 2]> {
+    let unused = |option: &str, device: &str| {
+        let what = format!("{option} is of no use without a {device}");
+        let next = format!("add --{device} PATH, or leave both paths out to make both devices");
+        Err(Failure::usage(what, next).into())
+    };
+    match (options.glove.as_deref(), options.gripper.as_deref()) {
+        (None, None) => Ok([Some(Path::new(GLOVE)), Some(Path::new(GRIPPER))]),
+        (None, _) if options.poses.is_some() => unused("--poses", "glove"),
+        (_, None) if options.gripper_model.is_some() => unused("--gripper-model", "gripper"),
+        (glove, gripper) => Ok([glove, gripper]),
+    }
+}
+
+/// A virtual glove behind a pseudo-terminal.
+struct Glove {
+    device: VirtualGlove,
+    handle: Handle,
+}
+
+impl Glove {
+    /// Makes one that `link` leads to.
+    fn start(motion: &Motion, link: &Path) -> Result<Self> {
+        let config = rig::glove::Config::at_baud(BAUD);
+        let device = VirtualGlove::new(motion.virtual_hand(), config);
+        let handle = spawn(Box::new(device.clone()), link)?;
+        Ok(Self { device, handle })
+    }
+
+    /// Waits until its sensors have booted, and asks its serial multiplexer.
+    fn answers(&self, interrupt: &Interrupt) -> Result<()> {
+        while !self.device.booted(self.handle.clock().now()) && !interrupt.sleep(LOOK) {}
+        probe::open_glove(self.handle.path(), interrupt).map(drop)
+    }
 }
 
 /// A virtual gripper and the way to it.
@@ -115,12 +157,6 @@ fn probe_gripper(place: &Path, model: Model, interrupt: &Interrupt) -> Result<()
     }
 }
 
-/// A virtual glove behind a pseudo-terminal that `link` leads to.
-fn glove(motion: &Motion, link: &Path) -> Result<Handle> {
-    let device = VirtualGlove::new(motion.source(), rig::glove::Config::at_baud(BAUD));
-    spawn(Box::new(device), link)
-}
-
 fn spawn(device: Box<dyn Device>, link: &Path) -> Result<Handle> {
     let spawned = realtime::starting(|| PtyDevice::spawn(device, Some(link)));
     spawned.and_then(|(handle, _)| handle).map_err(|error| {
@@ -132,4 +168,34 @@ fn spawn(device: Box<dyn Device>, link: &Path) -> Result<Handle> {
         ));
         Failure::new(format!("no virtual device there: {what}"), next).into()
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(glove: Option<&str>, gripper: Option<&str>) -> Simulate {
+        Simulate {
+            glove: glove.map(PathBuf::from),
+            gripper: gripper.map(PathBuf::from),
+            gripper_model: None,
+            poses: None,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn without_a_path_both_devices_are_made_and_with_one_that_device_alone() {
+        let paths = |glove, gripper| {
+            let options = options(glove, gripper);
+            places(&options).map(|places| places.map(|place| place.map(Path::to_owned)))
+        };
+        let some = |path: &str| Some(PathBuf::from(path));
+        assert_eq!(
+            paths(None, None).unwrap(),
+            [some("/tmp/glove"), some("/tmp/gripper")]
+        );
+        assert_eq!(paths(Some("a"), None).unwrap(), [some("a"), None]);
+        assert_eq!(paths(None, Some("b")).unwrap(), [None, some("b")]);
+    }
 }

@@ -18,6 +18,8 @@ use crate::record::Record;
 
 /// Bytes to a chunk at most; most are closed by time.
 const CHUNK: u64 = 1 << 20;
+/// Records of the bring-up to a chunk.
+const RECORDS: usize = 128;
 /// Pause between two closed chunks: a program that is killed loses no more.
 const CLOSE_EVERY: Duration = Duration::from_millis(500);
 /// Pause between two requests to the system to put it on the disk: a power cut loses little more.
@@ -142,8 +144,11 @@ impl LogFile {
         early: Vec<Record>,
         records: &Receiver<Record>,
     ) -> McapResult<()> {
-        for record in early {
-            self.write(&record)?;
+        for part in early.chunks(RECORDS) {
+            for record in part {
+                self.write(record)?;
+            }
+            self.close_chunk()?;
         }
         let mut close = Instant::now() + CLOSE_EVERY;
         let mut sync = Instant::now() + SYNC_EVERY;

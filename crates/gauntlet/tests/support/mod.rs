@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 
 pub mod devices;
 pub mod samples;
+pub mod terminal;
 
 use rustix::process::{Pid, Signal, kill_process};
 

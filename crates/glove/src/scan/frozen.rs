@@ -1,4 +1,4 @@
-//! Frozen sensors: the same raw bytes again and again although the sensor must have turned.
+//! Frozen sensors: the same raw bytes again and again although the sensor must have turned, or must have flickered.
 //!
 //! A hand held still is not frozen, and neither is a finger that rests while another moves. A sensor whose bytes have not
 //! changed for [`timing::FROZEN_AFTER`] is frozen if, in that time,
@@ -7,10 +7,14 @@
 //!   direction to 2⁻¹⁴ would need a joint that compensates exactly); or
 //! * it is the `hand` sensor, which hangs on nothing, and all five segments on it turned by one common rotation, as only
 //!   a turn of the whole hand makes them; or
-//! * its bytes have always flickered in the last digits while it was still, and now do not, while other sensors clearly
-//!   turned.
+//! * it flickered while it was still, as real sensors do, and now does not, while other sensors clearly turned.
 //!
-//! What this cannot tell: a frozen finger without flicker on a hand that does not turn looks like a finger held still.
+//! All sensors together are frozen if none changed a bit for [`timing::ALL_FROZEN_AFTER`] and half of them are known to
+//! flicker, whatever the hand does.
+//!
+//! Flicker shows while a sensor is nearly still: small changes to and fro ([`Lively`]). A calibration takes a second of
+//! stillness, so that it is known of each sensor before anything moves. What this cannot tell: a frozen finger without flicker on a
+//! hand that does not turn looks like a finger held still.
 
 use super::sensor::Sensor;
 use crate::hand::{self, Quaternion, SEGMENT_COUNT};
@@ -26,15 +30,28 @@ const COMMON: f32 = 0.087_266;
 /// The five segments that hang on the hand.
 const ON_HAND: [usize; 5] = [1, 4, 7, 10, 13];
 
-/// A change by no more than this in every component is flicker, in counts (0.03°).
-const FLICKER: i32 = 4;
+/// A change by no more than this in every component may be flicker, in counts (0.1°).
+const FLICKER: i32 = 16;
 
-/// Flickers without a standstill between after which a sensor counts as lively.
+/// Where the count of flickers makes a sensor lively: each adds 2, each other read takes 1 away. Flicker of ± 1 count gets
+/// there within a second of stillness; the turning points of a smooth motion never do.
 const LIVELY: u8 = 32;
+
+/// Unchanged reads that must have been seen to call all sensors frozen: after a pause one is no evidence.
+const ALL_READS: u8 = 4;
 
 /// Turns by [`TURNED`] of other sensors that must have been seen to call a lively sensor frozen: the first of each may have
 /// begun before its bytes stood still.
 const TURNS: u32 = 3;
+
+/// What a scan showed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Found {
+    /// Sensors that are frozen, each by itself (bit k: sensor k).
+    pub frozen: u16,
+    /// All have just become so together.
+    pub all: bool,
+}
 
 /// Remembers since when each sensor has not changed, and what the others did meanwhile.
 #[derive(Debug, Clone)]
@@ -44,6 +61,8 @@ pub(super) struct Detector {
     on_hand: [Quaternion; 5],
     /// Turns by [`TURNED`] of all sensors, wraps.
     turns: u32,
+    checked: Instant,
+    all: bool,
 }
 
 /// One sensor's history.
@@ -51,12 +70,23 @@ pub(super) struct Detector {
 struct Track {
     raw: Option<[u8; imu::SAMPLE_BYTES]>,
     since: Instant,
+    /// Reads without a change since then.
+    unchanged: u8,
     /// The parent's orientation, and all turns, when the bytes last changed.
     parent: Quaternion,
     turns: u32,
     /// Where the next turn is measured from.
     anchor: Quaternion,
-    flickers: u8,
+    lively: Lively,
+}
+
+/// Whether a sensor is known to flicker.
+#[derive(Debug, Clone, Copy, Default)]
+struct Lively {
+    /// The newest change in counts, if it was small.
+    change: Option<[i32; 4]>,
+    count: u8,
+    known: bool,
 }
 
 impl Detector {
@@ -64,36 +94,82 @@ impl Detector {
         let track = Track {
             raw: None,
             since: Instant::from_ticks(0),
+            unchanged: 0,
             parent: Quaternion::identity(),
             turns: 0,
             anchor: Quaternion::identity(),
-            flickers: 0,
+            lively: Lively::default(),
         };
         Self {
             tracks: [track; SEGMENT_COUNT],
             on_hand: [Quaternion::identity(); 5],
             turns: 0,
+            checked: Instant::from_ticks(0),
+            all: false,
         }
     }
 
-    /// Looks at a complete scan; the mask of sensors that are frozen.
-    pub fn check(&mut self, sensors: &[Sensor; SEGMENT_COUNT], now: Instant) -> u16 {
+    /// Sensors that are known to flicker, as a bit mask.
+    pub fn lively(&self) -> u16 {
+        let bit = |(k, track): (usize, &Track)| u16::from(track.lively.known) << k;
+        self.tracks.iter().enumerate().map(bit).sum()
+    }
+
+    /// Looks at a complete scan.
+    pub fn check(&mut self, sensors: &[Sensor; SEGMENT_COUNT], now: Instant) -> Found {
+        if since(now, self.checked) > timing::UNSEEN {
+            // Nobody saw whether they changed meanwhile.
+            for track in &mut self.tracks {
+                (track.since, track.unchanged) = (now, 0);
+            }
+        }
+        self.checked = now;
         self.count_turns(sensors);
         let mut frozen = 0;
         for (k, sensor) in sensors.iter().enumerate() {
-            // A sensor without a good sample says nothing; neither does one whose neighbours have none.
-            let raw = sensor
-                .raw
-                .filter(|_| sensor.health.is_good() && neighbours_good(k, sensors));
-            if raw.is_none() || raw != self.tracks[k].raw {
+            if !sensor.is_running() {
+                self.tracks[k].raw = None;
+                self.tracks[k].lively = Lively::default();
+                continue;
+            }
+            // Bytes that are no orientation, or did not come, say nothing.
+            let Some(raw) = sensor.raw.filter(|raw| imu::orientation(raw).is_ok()) else {
+                continue;
+            };
+            if self.tracks[k].raw != Some(raw) {
                 self.changed(k, raw, sensors, now);
-            } else if since(now, self.tracks[k].since) >= timing::FROZEN_AFTER
+                continue;
+            }
+            self.tracks[k].unchanged = self.tracks[k].unchanged.saturating_add(1);
+            self.tracks[k].lively.rest();
+            if sensor.health.is_good()
+                && since(now, self.tracks[k].since) >= timing::FROZEN_AFTER
                 && (self.must_have_turned(k, sensors) || self.stopped_flickering(k))
             {
                 frozen |= 1 << k;
             }
         }
-        frozen
+        let all = self.all_stand(now);
+        Found {
+            frozen,
+            all: all && !core::mem::replace(&mut self.all, all),
+        }
+    }
+
+    /// Whether no sensor that is read changes any more, and enough are known to flicker.
+    fn all_stand(&self, now: Instant) -> bool {
+        let read = self.tracks.iter().filter(|track| track.raw.is_some());
+        let (mut count, mut lively) = (0, 0);
+        for track in read {
+            let stands =
+                track.unchanged >= ALL_READS && since(now, track.since) >= timing::ALL_FROZEN_AFTER;
+            if !stands {
+                return false;
+            }
+            count += 1;
+            lively += usize::from(track.lively.known);
+        }
+        count > 1 && 2 * lively >= count
     }
 
     fn count_turns(&mut self, sensors: &[Sensor; SEGMENT_COUNT]) {
@@ -110,19 +186,19 @@ impl Detector {
     fn changed(
         &mut self,
         k: usize,
-        raw: Option<[u8; imu::SAMPLE_BYTES]>,
+        raw: [u8; imu::SAMPLE_BYTES],
         sensors: &[Sensor; SEGMENT_COUNT],
         now: Instant,
     ) {
         let track = &mut self.tracks[k];
         if since(now, track.since) >= timing::STANDSTILL {
-            track.flickers = 0;
-        } else if let (Some(before), Some(after)) = (&track.raw, &raw)
-            && is_flicker(before, after)
-        {
-            track.flickers = track.flickers.saturating_add(1);
+            // It can stand still to the bit: its flicker is to be seen anew.
+            track.lively = Lively::default();
+        } else if let Some(before) = &track.raw {
+            track.lively.take(before, &raw);
         }
-        (track.raw, track.since, track.turns) = (raw, now, self.turns);
+        (track.raw, track.since, track.turns) = (Some(raw), now, self.turns);
+        track.unchanged = 0;
         match hand::parent(k) {
             Some(parent) => track.parent = sensors[parent].sample().orientation,
             None => self.on_hand = ON_HAND.map(|s| sensors[s].sample().orientation),
@@ -130,13 +206,14 @@ impl Detector {
     }
 
     fn must_have_turned(&self, k: usize, sensors: &[Sensor; SEGMENT_COUNT]) -> bool {
-        let Some(parent) = hand::parent(k) else {
-            return self.hand_turned(sensors);
-        };
-        imu::angle_between(
-            &self.tracks[k].parent,
-            &sensors[parent].sample().orientation,
-        ) >= TURNED
+        let good = |s: usize| sensors[s].health.is_good();
+        match hand::parent(k) {
+            Some(parent) => {
+                let now = sensors[parent].sample().orientation;
+                good(parent) && imu::angle_between(&self.tracks[k].parent, &now) >= TURNED
+            }
+            None => ON_HAND.into_iter().all(good) && self.hand_turned(sensors),
+        }
     }
 
     fn hand_turned(&self, sensors: &[Sensor; SEGMENT_COUNT]) -> bool {
@@ -148,21 +225,33 @@ impl Detector {
 
     fn stopped_flickering(&self, k: usize) -> bool {
         let track = &self.tracks[k];
-        track.flickers >= LIVELY && self.turns.wrapping_sub(track.turns) >= TURNS
+        track.lively.known && self.turns.wrapping_sub(track.turns) >= TURNS
     }
 }
 
-fn is_flicker(before: &[u8; imu::SAMPLE_BYTES], after: &[u8; imu::SAMPLE_BYTES]) -> bool {
-    imu::counts(before)
-        .into_iter()
-        .zip(imu::counts(after))
-        .all(|(a, b)| (i32::from(a) - i32::from(b)).abs() <= FLICKER)
-}
+impl Lively {
+    /// Takes a read that is as the one before.
+    fn rest(&mut self) {
+        self.count = self.count.saturating_sub(1);
+    }
 
-fn neighbours_good(k: usize, sensors: &[Sensor; SEGMENT_COUNT]) -> bool {
-    let good = |s: usize| sensors[s].health.is_good();
-    match hand::parent(k) {
-        Some(parent) => good(parent),
-        None => ON_HAND.into_iter().all(good),
+    /// Takes two reads in a row that differ.
+    fn take(&mut self, before: &[u8; imu::SAMPLE_BYTES], after: &[u8; imu::SAMPLE_BYTES]) {
+        let (before, after) = (imu::counts(before), imu::counts(after));
+        let change: [i32; 4] = core::array::from_fn(|i| i32::from(after[i]) - i32::from(before[i]));
+        let small = change.iter().all(|c| c.abs() <= FLICKER);
+        let to_and_fro = self
+            .change
+            .is_some_and(|last| small && last.iter().zip(&change).any(|(a, b)| a * b < 0));
+        self.change = small.then_some(change);
+        self.count = if to_and_fro {
+            self.count.saturating_add(2)
+        } else {
+            self.count.saturating_sub(1)
+        };
+        if self.count >= LIVELY {
+            self.known = true;
+            self.count = LIVELY;
+        }
     }
 }

@@ -377,12 +377,7 @@ impl<B: Bus> BusScanner<B> {
             began,
             stepped: false,
         };
-        let frozen = self.frozen.check(&self.sensors, now);
-        for (k, sensor) in self.sensors.iter_mut().enumerate() {
-            if frozen >> k & 1 == 1 {
-                sensor.freeze(now, &mut self.counters);
-            }
-        }
+        self.judge_together(now);
         let sequence = self.counters.frames;
         self.counters.frames = sequence.wrapping_add(1);
         Some(Frame {

@@ -14,6 +14,20 @@ const BAD_MAX: u8 = 3;
 /// Rechecks in a row without a good sample after which it is brought up again.
 const RECHECKS_MAX: u8 = 3;
 
+/// Reads in a row that must agree before a sensor is believed where no hand can have turned it: 270 ms at 115200 baud.
+const AGREEING: u8 = 10;
+
+/// How far reads that agree may be apart, and how near to the last good sample a spike must end, radians (45°): a hand at
+/// 1,600 °/s turns as far in a scan.
+const AGREE_WITHIN: f32 = core::f32::consts::FRAC_PI_4;
+
+/// A sensor that jumped as no hand does: what it has read since.
+#[derive(Debug, Clone, Copy)]
+struct Suspect {
+    read: Quaternion,
+    agreeing: u8,
+}
+
 /// One sensor.
 #[derive(Debug, Clone)]
 pub(super) struct Sensor {
@@ -30,8 +44,13 @@ pub(super) struct Sensor {
     /// Whether its first bring-up has ended, well or not.
     pub tried: bool,
     /// It is frozen, or was and has not changed since: not believed until its bytes change.
-    pub distrusted: Option<[u8; imu::SAMPLE_BYTES]>,
+    pub distrusted: Option<([u8; imu::SAMPLE_BYTES], Fault)>,
+    /// Another channel gives the same bits as this one's.
+    pub is_twin: bool,
+    /// How far it jumped, radians, when it has just been believed again after a jump that stayed.
+    pub jumped: Option<f32>,
     good: Option<(Quaternion, Instant)>,
+    suspect: Option<Suspect>,
     /// Good samples since it came up.
     fresh: bool,
     up_since: Instant,
@@ -52,7 +71,10 @@ impl Sensor {
             pointer_set: false,
             tried: false,
             distrusted: None,
+            is_twin: false,
+            jumped: None,
             good: None,
+            suspect: None,
             fresh: false,
             up_since: Instant::from_ticks(0),
             tries: 0,
@@ -109,19 +131,44 @@ impl Sensor {
         }
     }
 
-    fn judge(&self, raw: &[u8; imu::SAMPLE_BYTES], stamp: Instant) -> Result<Quaternion, Fault> {
+    fn judge(
+        &mut self,
+        raw: &[u8; imu::SAMPLE_BYTES],
+        stamp: Instant,
+    ) -> Result<Quaternion, Fault> {
         let orientation = imu::orientation(raw)?;
-        if self.distrusted == Some(*raw) {
-            return Err(Fault::Frozen);
+        if let Some((withdrawn, fault)) = self.distrusted
+            && withdrawn == *raw
+        {
+            return Err(fault);
         }
-        match self.good {
-            Some((previous, at))
-                if self.fresh && !imu::is_reachable(&previous, &orientation, since(stamp, at)) =>
-            {
-                Err(Fault::TooFast)
+        if self.is_twin {
+            return Err(Fault::Twin);
+        }
+        let Some((good, at)) = self.good.filter(|_| self.fresh) else {
+            self.suspect = None;
+            return Ok(orientation);
+        };
+        let Some(suspect) = self.suspect else {
+            if imu::is_reachable(&good, &orientation, since(stamp, at)) {
+                return Ok(orientation);
             }
-            _ => Ok(orientation),
+            self.suspect = Some(Suspect::at(orientation));
+            return Err(Fault::TooFast);
+        };
+        let by = imu::angle_between(&good, &orientation);
+        if by <= AGREE_WITHIN {
+            // A spike, and it is over.
+            self.suspect = None;
+            return Ok(orientation);
         }
+        let next = suspect.followed_by(orientation);
+        self.suspect = Some(next);
+        if next.agreeing < AGREEING {
+            return Err(Fault::TooFast);
+        }
+        (self.suspect, self.jumped) = (None, Some(by));
+        Ok(orientation)
     }
 
     fn reject(&mut self, fault: Fault, now: Instant, counters: &mut Counters) {
@@ -133,7 +180,7 @@ impl Sensor {
         self.health = Health::Rejected(fault);
         match fault {
             // Right bytes of the right register, only not to be believed: time mends these.
-            Fault::TooFast => return,
+            Fault::TooFast | Fault::AllFrozen | Fault::Twin => return,
             Fault::Frozen => {
                 if since(now, self.up_since) >= timing::FROZEN_RESTART {
                     self.restart(Error::Rejected(fault), now);
@@ -158,14 +205,18 @@ impl Sensor {
         }
     }
 
-    /// The scan found it frozen: its newest sample is withdrawn.
-    pub fn freeze(&mut self, now: Instant, counters: &mut Counters) {
-        if let (Some(raw), Health::Good) = (self.raw, self.health) {
-            self.distrusted = Some(raw);
+    /// The scan found something wrong with it: its newest sample is withdrawn. True if it counted as good until now.
+    pub fn withdraw(&mut self, fault: Fault, now: Instant, counters: &mut Counters) -> bool {
+        let (Some(raw), Health::Good) = (self.raw, self.health) else {
+            return false;
+        };
+        if fault != Fault::Twin {
+            self.distrusted = Some((raw, fault));
             self.up_since = now;
-            self.health = Health::Rejected(Fault::Frozen);
-            count(Fault::Frozen, counters);
         }
+        self.health = Health::Rejected(fault);
+        count(fault, counters);
+        true
     }
 
     /// A sample did not come.
@@ -270,6 +321,23 @@ impl Sensor {
     }
 }
 
+impl Suspect {
+    fn at(read: Quaternion) -> Self {
+        Self { read, agreeing: 1 }
+    }
+
+    /// One more read: it agrees with the one before, or the count begins anew.
+    fn followed_by(self, read: Quaternion) -> Self {
+        if imu::angle_between(&self.read, &read) > AGREE_WITHIN {
+            return Self::at(read);
+        }
+        Self {
+            read,
+            agreeing: self.agreeing.saturating_add(1),
+        }
+    }
+}
+
 /// Whether a bus error may be the sensor's (or the multiplexer's) doing, rather than the serial bridge's.
 fn is_sensors(cause: bus::Error) -> bool {
     !matches!(
@@ -284,7 +352,8 @@ fn count(fault: Fault, counters: &mut Counters) {
         Fault::NotUnit => &mut counters.not_unit,
         Fault::Restarted => &mut counters.restarted,
         Fault::TooFast => &mut counters.too_fast,
-        Fault::Frozen => &mut counters.frozen,
+        Fault::Frozen | Fault::AllFrozen => &mut counters.frozen,
+        Fault::Twin => &mut counters.twins,
     };
     *counter = counter.wrapping_add(1);
 }

@@ -139,6 +139,11 @@ impl Bno055 {
         self.boot_until = now + BOOT;
     }
 
+    /// Whether it has booted by `now`.
+    pub fn booted(&self, now: Instant) -> bool {
+        now >= self.boot_until
+    }
+
     /// Whether it acknowledges its address at `now`.
     pub fn acknowledges(&mut self, now: Instant) -> bool {
         if self.faults.unplugged || now < self.boot_until {

@@ -46,6 +46,8 @@ pub(super) struct Bus {
     pub sensors: [Bno055; 16],
     /// Connected channels, one bit each.
     pub channels: u8,
+    /// The multiplexer takes and reads back selections, but these channels stay connected.
+    pub mux_stuck: Option<u8>,
     pub mux_unplugged: bool,
     pub mux_address: u8,
     /// SDA or SCL stuck low: nothing ends by itself.
@@ -62,6 +64,7 @@ impl Bus {
         Self {
             sensors: core::array::from_fn(|index| Bno055::new(index, now)),
             channels: 0,
+            mux_stuck: None,
             mux_unplugged: false,
             mux_address: MUX,
             dead: false,
@@ -158,7 +161,7 @@ impl Bus {
         let Some(odd) = SENSORS.iter().position(|a| *a == address) else {
             return Vec::new();
         };
-        let channels = self.channels;
+        let channels = self.mux_stuck.unwrap_or(self.channels);
         let connected = (0..8).filter(|channel| channels & (1 << channel) != 0);
         connected
             .map(|channel| 2 * channel + odd)

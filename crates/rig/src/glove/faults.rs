@@ -66,6 +66,13 @@ impl VirtualGlove {
         lock(&self.state).bus.mux_unplugged = unplugged;
     }
 
+    /// Leaves the multiplexer's `channel` connected whatever is selected, while what was selected reads back right; `None` lets
+    /// it select again.
+    pub fn stick_mux(&self, channel: Option<u8>) {
+        lock(&self.state).bus.mux_stuck =
+            channel.map(|channel| 1u8.checked_shl(channel.into()).unwrap_or(0));
+    }
+
     /// Sets the multiplexer's address pins: it answers at `address`, 0x70 to 0x77.
     pub fn set_mux_address(&self, address: u8) {
         lock(&self.state).bus.mux_address = address;
@@ -147,6 +154,13 @@ impl VirtualGlove {
     #[must_use]
     pub fn channels(&self) -> u8 {
         lock(&self.state).bus.channels
+    }
+
+    /// Whether every sensor on the bus has booted by `now`.
+    #[must_use]
+    pub fn booted(&self, now: Instant) -> bool {
+        let state = lock(&self.state);
+        !state.off && state.bus.sensors.iter().all(|chip| chip.booted(now))
     }
 
     /// What it has counted.

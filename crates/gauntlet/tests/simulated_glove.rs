@@ -1,0 +1,79 @@
+//! The glove that `simulate` makes, as a program finds it: its sensors answer, and its hand lies flat when the port is opened.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod support;
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use embedded_io::{Read, ReadReady, Write};
+use gauntlet::platform::Clock;
+use gauntlet::port::{BAUD, Port};
+use glove::hand::flat::{FlatHand, Progress};
+use glove::hand::{Calibration, Side, joint_angles};
+use glove::scan::{Config, Scanner};
+use glove::timing;
+use support::Simulation;
+
+/// Channel 0 of the multiplexer, then the chip id of the sensor at 0x28.
+const CHIP_ID: [u8; 13] = [
+    0x53, 0xE0, 0x01, 0x01, 0x50, 0x53, 0x50, 0x01, 0x00, 0x53, 0x51, 0x01, 0x50,
+];
+
+#[test]
+fn ready_is_said_when_the_sensors_answer() {
+    let simulation = Simulation::start(true, false);
+    let mut port = Port::open(Path::new(&simulation.glove()), BAUD).unwrap();
+    port.write_all(&CHIP_ID).unwrap();
+    let end = Instant::now() + Duration::from_millis(500);
+    while port.read_ready() == Ok(false) && Instant::now() < end {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let mut id = [0];
+    assert_eq!(port.read(&mut id), Ok(1), "a sensor that boots is silent");
+    assert_eq!(id, [0xA0]);
+}
+
+/// Opens the glove's port, calibrates, and looks how far the hand then moves in four seconds: the furthest angle, radians.
+fn calibrate_and_watch(path: &str) -> f32 {
+    let port = Port::open(Path::new(path), BAUD).unwrap();
+    let mut scanner = Scanner::new(port, Config::default());
+    let clock = Clock::start();
+    let mut flat = FlatHand::start(
+        clock.now(),
+        glove::Duration::from_ticks(10_000_000),
+        &Calibration::identity(),
+    );
+    let calibration = loop {
+        std::thread::sleep(Duration::from_micros(300));
+        let now = clock.now();
+        let progress = match scanner.poll(now) {
+            Some(frame) => flat.take(&frame, now),
+            None => flat.progress(now),
+        };
+        match progress {
+            Progress::Waiting { .. } => {}
+            Progress::Done(calibration) => break calibration,
+            Progress::Refused(refusal) => panic!("{refusal}"),
+        }
+    };
+    assert!(timing::STILL_FOR < glove::Duration::from_ticks(3_000_000));
+    let (end, mut furthest) = (Instant::now() + Duration::from_secs(6), 0.0f32);
+    while Instant::now() < end {
+        std::thread::sleep(Duration::from_micros(300));
+        if let Some(frame) = scanner.poll(clock.now()) {
+            let angles = joint_angles(&frame.orientations(), &calibration, Side::Right);
+            furthest = angles.iter().fold(furthest, |most, a| most.max(a.abs()));
+        }
+    }
+    furthest
+}
+
+#[test]
+fn the_hand_lies_flat_at_every_opening_of_the_port_and_moves_after_that() {
+    let simulation = Simulation::start(true, false);
+    for opening in 0..2 {
+        let furthest = calibrate_and_watch(&simulation.glove());
+        assert!(furthest > 0.3, "opening {opening}: {furthest} rad");
+    }
+}

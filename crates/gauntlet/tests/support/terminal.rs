@@ -1,0 +1,129 @@
+//! The tool on a terminal, with the person's side of it in the test's hands.
+
+use std::io::Read;
+use std::os::fd::{AsFd, OwnedFd};
+use std::process::{Child, Stdio};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{Winsize, tcsetwinsize};
+
+use super::command;
+
+/// A pseudo-terminal, and the tool on it.
+pub struct Terminal {
+    pub child: Child,
+    master: Option<OwnedFd>,
+    reads: Arc<AtomicBool>,
+    ends: Arc<AtomicBool>,
+    seen: Arc<Mutex<Vec<u8>>>,
+    reader: Option<JoinHandle<()>>,
+}
+
+impl Terminal {
+    /// Starts the tool; what it draws is read all the time.
+    pub fn start(arguments: &[&str]) -> Self {
+        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        grantpt(&master).unwrap();
+        unlockpt(&master).unwrap();
+        let size = Winsize {
+            ws_row: 24,
+            ws_col: 80,
+            ws_xpixel: 0,
+            ws_ypixel: 0,
+        };
+        tcsetwinsize(&master, size).unwrap();
+        let name = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
+        let side = || {
+            let file = std::fs::File::options().read(true).write(true).open(&name);
+            Stdio::from(file.unwrap())
+        };
+        let child = command(arguments)
+            .stdin(side())
+            .stdout(side())
+            .stderr(side())
+            .spawn()
+            .unwrap();
+        let (reads, ends) = (Arc::new(AtomicBool::new(true)), Arc::default());
+        let seen = Arc::default();
+        let copy = master.try_clone().unwrap();
+        let reader = std::thread::spawn({
+            let (reads, ends) = (Arc::clone(&reads), Arc::clone(&ends));
+            let seen = Arc::clone(&seen);
+            move || read(copy, &reads, &ends, &seen)
+        });
+        Self {
+            child,
+            master: Some(master),
+            reads,
+            ends,
+            seen,
+            reader: Some(reader),
+        }
+    }
+
+    /// From now on nothing is read: the terminal takes what its buffer holds, and no more.
+    pub fn stop_reading(&self) {
+        self.reads.store(false, Ordering::Relaxed);
+    }
+
+    pub fn read_again(&self) {
+        self.reads.store(true, Ordering::Relaxed);
+    }
+
+    /// Types.
+    pub fn keys(&self, bytes: &[u8]) {
+        let written = rustix::io::write(self.master.as_ref().unwrap(), bytes);
+        assert_eq!(written, Ok(bytes.len()));
+    }
+
+    /// Closes the window.
+    pub fn close(&mut self) {
+        self.ends.store(true, Ordering::Relaxed);
+        self.reader.take().unwrap().join().unwrap();
+        drop(self.master.take());
+    }
+
+    /// All that was drawn, with the terminal's control sequences.
+    pub fn seen(&self) -> String {
+        String::from_utf8_lossy(&self.seen.lock().unwrap()).into_owned()
+    }
+}
+
+fn read(master: OwnedFd, reads: &AtomicBool, ends: &AtomicBool, seen: &Mutex<Vec<u8>>) {
+    let mut file = std::fs::File::from(master);
+    let slice = Timespec {
+        tv_sec: 0,
+        tv_nsec: 20_000_000,
+    };
+    while !ends.load(Ordering::Relaxed) {
+        if !reads.load(Ordering::Relaxed) {
+            std::thread::sleep(Duration::from_millis(20));
+            continue;
+        }
+        let ready = {
+            let mut polled = [PollFd::from_borrowed_fd(file.as_fd(), PollFlags::IN)];
+            poll(&mut polled, Some(&slice)).unwrap_or(0)
+        };
+        let mut bytes = [0; 4096];
+        if ready > 0 {
+            match file.read(&mut bytes) {
+                Ok(count) if count > 0 => seen.lock().unwrap().extend(&bytes[..count]),
+                // Nobody has the other side open any more.
+                _ => std::thread::sleep(Duration::from_millis(20)),
+            }
+        }
+    }
+}
+
+impl Drop for Terminal {
+    fn drop(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+        self.ends.store(true, Ordering::Relaxed);
+    }
+}
