@@ -8,9 +8,10 @@ use hae::image::{ALIGNMENT, Checked, JointOrder, Meta, Parameters};
 use hae::quantized;
 use serde::Serialize;
 use trainer::data::Matrix;
-use trainer::model::Model;
+use trainer::model::{Model, has_digest};
 
 use crate::failure::{Failure, OrFail, told};
+use crate::note;
 use crate::poses::Motion;
 use crate::record::{AXES, AXIS_NAMES};
 
@@ -58,18 +59,18 @@ impl Int16 {
 /// # Errors
 /// A failure that names the file and what is wrong with it.
 pub fn weights(path: &Path, int16: Option<&Path>) -> Result<Weights> {
-    let name = || format!("the file {}", path.display());
-    let length = std::fs::metadata(path)
-        .or_fail(name, "the path of a trained model or a weights image")?
-        .len();
-    if length > LONGEST_FILE {
+    let bytes = trainer::model::read(path).map_err(told)?;
+    if bytes.len() as u64 > LONGEST_FILE {
         return Err(Failure::new(
-            format!("{} has {length} bytes, far more than a map", path.display()),
+            format!(
+                "{} has more bytes than any map: {}",
+                path.display(),
+                bytes.len()
+            ),
             "a model that `gauntlet train` made",
         )
         .into());
     }
-    let bytes = std::fs::read(path).or_fail(name, "a file that you may read")?;
     if bytes.starts_with(&hae::image::MAGIC) {
         if int16.is_some() {
             return Err(Failure::usage(
@@ -84,7 +85,7 @@ pub fn weights(path: &Path, int16: Option<&Path>) -> Result<Weights> {
             "an image that `gauntlet export` wrote, whole",
         );
     }
-    let model = load(path)?;
+    let model = hand(parsed(&bytes, path)?, path)?;
     let image = match int16 {
         None => image(&model)?,
         Some(poses) => image_int16(&model, &Motion::open(Some(poses), 0)?.frames())?,
@@ -128,7 +129,34 @@ const _: () = assert!(
 /// # Errors
 /// A failure that names the file and what is wrong with it.
 pub fn load(path: &Path) -> Result<Model> {
-    let model = Model::load_for(path, JOINT_COUNT, AXES).map_err(told)?;
+    hand(load_any(path)?, path)
+}
+
+/// Loads a model of any shape; says so where it carries no digest of its weights.
+///
+/// # Errors
+/// A failure that names the file and what is wrong with it.
+pub fn load_any(path: &Path) -> Result<Model> {
+    parsed(&trainer::model::read(path).map_err(told)?, path)
+}
+
+fn parsed(bytes: &[u8], path: &Path) -> Result<Model> {
+    let mut model = Model::from_bytes(bytes, path).map_err(told)?;
+    if has_digest(bytes) {
+        let digest = model.weights_sha256();
+        model.metadata.insert("weights_sha256".to_owned(), digest);
+    } else {
+        note!(
+            "warning: {} is of an earlier version and carries no digest of its weights: damage would not be seen; train it \
+             again for one",
+            path.display()
+        );
+    }
+    Ok(model)
+}
+
+fn hand(model: Model, path: &Path) -> Result<Model> {
+    model.require_shape(path, JOINT_COUNT, AXES).map_err(told)?;
     let [_, hidden, _] = model.shape();
     if hidden != bridge::HIDDEN {
         return Err(Failure::new(

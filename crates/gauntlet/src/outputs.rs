@@ -1,9 +1,11 @@
 //! Files the tool writes: never over an input, never over something else than a file of their own kind.
 
 use std::io::Read;
-use std::path::Path;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
+use trainer::whole_file;
 
 use crate::failure::Failure;
 
@@ -12,6 +14,8 @@ use crate::failure::Failure;
 pub enum Kind {
     /// A trained model, safetensors.
     Model,
+    /// The state of a training, safetensors, too.
+    Checkpoint,
     /// A session log, MCAP.
     Log,
     /// A weights image.
@@ -22,19 +26,18 @@ impl Kind {
     fn name(self) -> &'static str {
         match self {
             Self::Model => "a safetensors file",
+            Self::Checkpoint => "a checkpoint",
             Self::Log => "an MCAP file",
             Self::Image => "a weights image",
         }
     }
 
     /// Whether a file that starts so, and is `length` bytes long, may be one of this kind.
-    fn matches(self, start: &[u8; 9], length: u64) -> bool {
+    fn matches(self, start: &[u8], length: u64) -> bool {
         match self {
-            // Eight bytes length of the header, then a JSON object.
-            Self::Model => {
-                let [header @ .., first] = start;
-                *first == b'{' && u64::from_le_bytes(*header) < length
-            }
+            Self::Model => is_safetensors(start, length) && !names(start, CHECKPOINT),
+            // What names neither is of an earlier version.
+            Self::Checkpoint => is_safetensors(start, length) && !names(start, MODEL),
             Self::Log => start.starts_with(b"\x89MCAP0\r\n"),
             Self::Image => start.starts_with(&hae::image::MAGIC),
         }
@@ -54,10 +57,7 @@ pub fn check_new(path: &Path) -> Result<()> {
     if std::fs::symlink_metadata(path).is_ok() {
         return refuse("it exists, and a log is never written over anything");
     }
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
+    let folder = folder_of(path);
     if !folder.is_dir() {
         return refuse("its folder does not exist");
     }
@@ -67,50 +67,113 @@ pub fn check_new(path: &Path) -> Result<()> {
     }
 }
 
+/// What the header of a checkpoint names, and that of a model.
+const CHECKPOINT: &[u8] = b"\"settings_sha256\"";
+const MODEL: &[u8] = b"\"f.w1\"";
+/// The headers of both are shorter.
+const HEADER: u64 = 64 << 10;
+/// The room that a model, a checkpoint or an image may need.
+const ROOM: usize = 1 << 20;
+
+/// Eight bytes length of the header, then a JSON object.
+fn is_safetensors(start: &[u8], length: u64) -> bool {
+    let Some((header, rest)) = start.split_first_chunk::<8>() else {
+        return false;
+    };
+    rest.first() == Some(&b'{') && u64::from_le_bytes(*header) < length
+}
+
+fn names(start: &[u8], word: &[u8]) -> bool {
+    start.windows(word.len()).any(|window| window == word)
+}
+
+/// Where a file is or would be, by whatever name.
+fn place(path: &Path) -> Option<PathBuf> {
+    let there = std::fs::canonicalize(path).ok();
+    there.or_else(|| {
+        Some(
+            std::fs::canonicalize(folder_of(path))
+                .ok()?
+                .join(path.file_name()?),
+        )
+    })
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// Whether two names are of one file: a link of either kind, or another way to the same place.
+fn is_same(a: &Path, b: &Path) -> bool {
+    let node = |path| {
+        std::fs::metadata(path)
+            .ok()
+            .map(|file| (file.dev(), file.ino()))
+    };
+    let places = place(a).is_some_and(|first| place(b) == Some(first));
+    places || node(a).is_some_and(|first| node(b) == Some(first))
+}
+
 /// Refuses to write `path` where it is one of `inputs`, where it exists and is not of this kind, or where its folder does
-/// not exist. An empty file counts as none.
+/// not exist. An empty file counts as none. What is written whole and then renamed is tried: a folder that may not be written in, a
+/// full disk or a name too long are told now, not after the work.
 ///
 /// # Errors
 /// A usage failure that names the path.
 pub fn check(path: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
-    let refuse = |why: &str| {
-        let what = format!("{} is not written: {why}", path.display());
-        Err(Failure::usage(what, "another name, in a folder that exists").into())
-    };
-    let folder = match path.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    };
-    if !folder.is_dir() {
+    let refuse = |why: &str| Err(refusal(path, why));
+    if !folder_of(path).is_dir() {
         return refuse("its folder does not exist");
     }
-    let Ok(there) = std::fs::metadata(path) else {
-        return Ok(());
-    };
-    let real = std::fs::canonicalize(path).ok();
-    let is_input = |input: &&Path| real.is_some() && std::fs::canonicalize(input).ok() == real;
-    if inputs.iter().any(is_input) {
+    if inputs.iter().any(|input| is_same(path, input)) {
         return refuse("it is an input of this very command");
     }
+    if let Ok(there) = std::fs::metadata(path)
+        && let Some(why) = unlike(path, kind, &there)
+    {
+        return refuse(&why);
+    }
+    match kind {
+        Kind::Log => Ok(()),
+        _ => room(path),
+    }
+}
+
+/// Tries whether a file could be written to `path` now.
+///
+/// # Errors
+/// A usage failure that names the path.
+pub fn room(path: &Path) -> Result<()> {
+    whole_file::probe(path, ROOM).map_err(|error| refusal(path, &error.to_string()))
+}
+
+fn refusal(path: &Path, why: &str) -> anyhow::Error {
+    let what = format!("{} is not written: {why}", path.display());
+    Failure::usage(what, "another name, in a folder that exists and has room").into()
+}
+
+/// Why what is there is not replaced by something of this kind.
+fn unlike(path: &Path, kind: Kind, there: &std::fs::Metadata) -> Option<String> {
     if !there.is_file() {
-        return refuse("it exists and is not a file");
+        return Some("it exists and is not a file".to_owned());
     }
     if there.len() == 0 {
-        return Ok(());
+        return None;
     }
-    let mut start = [0; 9];
-    let read = std::fs::File::open(path).and_then(|mut file| file.read_exact(&mut start));
-    if read.is_err() || !kind.matches(&start, there.len()) {
-        return refuse(&format!("it exists and is not {}", kind.name()));
-    }
-    Ok(())
+    let mut start = Vec::new();
+    let read = std::fs::File::open(path).and_then(|file| file.take(HEADER).read_to_end(&mut start));
+    let fits = read.is_ok() && kind.matches(&start, there.len());
+    (!fits).then(|| format!("it exists and is not {}", kind.name()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn refusal(path: &Path, kind: Kind, inputs: &[&Path]) -> String {
+    fn said(path: &Path, kind: Kind, inputs: &[&Path]) -> String {
         check(path, kind, inputs).unwrap_err().to_string()
     }
 
@@ -122,7 +185,7 @@ mod tests {
         std::fs::write(&input, "time_s").unwrap();
         std::os::unix::fs::symlink(&input, &link).unwrap();
         for path in [&input, &link] {
-            assert!(refusal(path, Kind::Model, &[&input]).contains("an input"));
+            assert!(said(path, Kind::Model, &[&input]).contains("an input"));
         }
     }
 
@@ -151,6 +214,56 @@ mod tests {
                 "{content:?}"
             );
         }
+    }
+
+    #[test]
+    fn one_file_under_two_names_is_one_though_it_is_not_there_yet() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("m");
+        let sub = folder.path().join("sub");
+        std::fs::create_dir(&sub).unwrap();
+        for (other, is_same) in [
+            ("../m", true),
+            (".././m", true),
+            ("m", false),
+            ("../n", false),
+        ] {
+            let refused = check(&sub.join(other), Kind::Checkpoint, &[&out]).is_err();
+            assert_eq!(refused, is_same, "{other}");
+        }
+        std::fs::write(&out, "").unwrap();
+        let hard = folder.path().join("hard");
+        std::fs::hard_link(&out, &hard).unwrap();
+        assert!(said(&hard, Kind::Checkpoint, &[&out]).contains("an input"));
+    }
+
+    #[test]
+    fn a_model_and_a_checkpoint_do_not_take_each_other_s_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("out");
+        let file = |name: &str| format!("\u{10}\0\0\0\0\0\0\0{{\"{name}\":1}}         ");
+        for (name, taken) in [
+            ("f.w1", [true, false]),
+            ("settings_sha256", [false, true]),
+            ("other", [true, true]),
+        ] {
+            std::fs::write(&path, file(name)).unwrap();
+            let found = [Kind::Model, Kind::Checkpoint].map(|kind| check(&path, kind, &[]).is_ok());
+            assert_eq!(found, taken, "{name}");
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_told_before_the_work_and_nothing_is_left() {
+        let folder = tempfile::tempdir().unwrap();
+        let long = folder.path().join("n".repeat(250));
+        for kind in [Kind::Model, Kind::Checkpoint, Kind::Image] {
+            assert!(said(&long, kind, &[]).contains("is not written"));
+            // A folder in which nobody may write, root neither.
+            assert!(said(Path::new("/proc/m"), kind, &[]).contains("is not written"));
+            check(&folder.path().join("fine"), kind, &[]).unwrap();
+        }
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
     #[test]

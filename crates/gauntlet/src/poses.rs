@@ -6,11 +6,12 @@ use std::sync::Arc;
 use anyhow::Result;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES, LIMITS};
 use rig::{FlatFirst, PoseSource};
-use trainer::data::{Error, Matrix, Poses, read_poses, require_rows};
+use trainer::data::{Columns, Error, Matrix, Poses, Table, require_rows};
 use trainer::measures::NEIGHBOURS;
 use trainer::motion::{FRAMES, Generator, RATE_HZ};
 
 use crate::failure::told;
+use crate::note;
 
 /// Fewest rows worth training on: some must be held out, and the distances of Eq. 17 need ten neighbours.
 pub const LEAST_ROWS: usize = 50;
@@ -65,12 +66,14 @@ impl Motion {
         let Some(path) = path else {
             return Ok(Self::Generated { seed });
         };
-        let found = match read_poses(path, &JOINT_NAMES) {
+        let mut table = Table::open(path, Columns::Named(&JOINT_NAMES)).map_err(told)?;
+        let found = match table.poses(&JOINT_NAMES) {
             Ok(poses) => poses,
             // The reader asks for one row; say how many this work needs.
             Err(Error::TooFewRows { .. }) => Poses::default(),
             Err(other) => return Err(told(other)),
         };
+        tell_notes(path, &table);
         require_rows(path, found.rows.rows, needed).map_err(told)?;
         Ok(Self::Recorded {
             poses: Arc::new(found),
@@ -124,6 +127,13 @@ impl Motion {
             }
             Self::Recorded { poses, .. } => Box::new(Played::new(poses)),
         }
+    }
+}
+
+/// Says what of a file was taken otherwise than it stands.
+pub(crate) fn tell_notes(path: &Path, table: &Table) {
+    for line in table.notes() {
+        note!("note: {}: {line}", path.display());
     }
 }
 

@@ -11,6 +11,8 @@ use crate::stats::seconds;
 
 /// Pause between two plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(5);
+/// What is left stands first and is never cut off; a narrow terminal cuts the details at the end.
+const TEMPLATE: &str = "{percent:>3} % {prefix} {bar:16} {wide_msg}";
 /// Redraws a second.
 const REDRAWS: u8 = 10;
 
@@ -57,17 +59,19 @@ impl Progress {
     /// As [`Progress::at`], with an estimate that knows better than "as fast as so far".
     pub fn at_with(&mut self, done: u64, left: Option<Duration>, detail: impl FnOnce() -> String) {
         let left = left.or_else(|| remaining(self.started.elapsed(), done, self.total));
+        let done = done.min(self.total);
         let left = left.map_or_else(String::new, |left| {
             format!(", about {} left", seconds(left))
         });
         match &mut self.shown {
             Display::Bar(bar) => {
                 bar.set_position(done);
-                bar.set_message(format!("{}{left}", detail()));
+                bar.set_prefix(format!("{}{left}", self.what));
+                bar.set_message(detail());
             }
             Display::Lines { last } if last.elapsed() >= LINE_EVERY => {
                 *last = Instant::now();
-                let percent = 100 * done.min(self.total) / self.total.max(1);
+                let percent = 100 * done / self.total.max(1);
                 note!("{}: {percent} %, {}{left}", self.what, detail());
             }
             Display::Lines { .. } | Display::Quiet => {}
@@ -111,8 +115,7 @@ impl Drop for Progress {
 fn bar(what: &'static str, total: u64) -> ProgressBar {
     let bar =
         ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(REDRAWS));
-    let template = "{prefix} {bar:30} {percent:>3} %  {elapsed}  {wide_msg}";
-    if let Ok(style) = ProgressStyle::with_template(template) {
+    if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
         bar.set_style(style.progress_chars("━╸─"));
     }
     bar.set_prefix(what);

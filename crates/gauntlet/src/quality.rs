@@ -7,11 +7,17 @@ use serde::Serialize;
 use trainer::data::{Matrix, Pairs};
 use trainer::measures::{Coverage, Test, measure, occupancy};
 use trainer::model::{Model, Normalisation};
+use trainer::spread::spread;
 
 /// Least volume occupancy of a map worth driving with.
 pub const LEAST_OCCUPANCY: f64 = 0.90;
 /// Greatest d-Knn of a map without folds.
 pub const GREATEST_D_KNN: f64 = 16.0;
+/// Hand poses that the measures of a hand's map are taken on, the farthest from one another (the paper measures on 254): volume
+/// occupancy falls with their number, and neighbours in time stand for nothing new.
+pub const MEASURED: usize = 254;
+/// Fewest of them that the volume occupancy is taken to be of: a handful of poses with balls of their own would cover the gripper.
+const LEAST_MEASURED: usize = 200;
 /// Gripper poses that stand for the whole configuration space.
 const TARGETS: usize = 8000;
 /// Counts from open to closed.
@@ -35,13 +41,7 @@ pub struct Quality {
 impl Quality {
     /// Measures `model` on `frames` (radians, one hand pose a row) against `targets` (counts).
     pub fn of(model: &Model, frames: &Matrix, targets: &Matrix, measured_on: String) -> Self {
-        Self::from_measured(&Measured::of(
-            model,
-            (frames, targets),
-            &GRIPPER,
-            None,
-            measured_on,
-        ))
+        Self::from_measured(&Measured::of_hand(model, (frames, targets), measured_on))
     }
 
     /// Of measures whose occupancy is known.
@@ -58,6 +58,26 @@ impl Quality {
     /// Whether the map is worth driving with. A measure that is no number is not.
     pub fn good(&self) -> bool {
         self.volume_occupancy >= LEAST_OCCUPANCY && self.d_knn <= GREATEST_D_KNN
+    }
+
+    /// Why the map is not worth driving with; `None` when it is.
+    pub fn fault(&self) -> Option<String> {
+        if self.good() {
+            return None;
+        }
+        let few = if self.frames < LEAST_MEASURED {
+            format!(
+                "; {} poses are few to measure on: a verdict takes {LEAST_MEASURED}",
+                self.frames
+            )
+        } else {
+            String::new()
+        };
+        Some(format!(
+            "the map is not good enough to drive with: volume occupancy {:.3} (at least {LEAST_OCCUPANCY}), d-Knn {:.2} (at most \
+             {GREATEST_D_KNN}){few}",
+            self.volume_occupancy, self.d_knn
+        ))
     }
 
     /// In one line.
@@ -98,6 +118,26 @@ pub struct Measured {
 }
 
 impl Measured {
+    /// Measures the map of a hand on [`MEASURED`] of the frames, spread by distance, or on all where there are fewer: so that what is
+    /// measured does not depend on how often a motion was sampled.
+    pub fn of_hand(
+        model: &Model,
+        (frames, targets): (&Matrix, &Matrix),
+        measured_on: String,
+    ) -> Self {
+        let spread = frames.select(&spread(frames, MEASURED));
+        let measured_on = if spread.rows < frames.rows {
+            format!("{measured_on}, spread by distance among {}", frames.rows)
+        } else {
+            measured_on
+        };
+        let counted = spread.rows.max(LEAST_MEASURED);
+        let coverage = GRIPPER
+            .epsilon(counted)
+            .map_or(Coverage::Unknown, Coverage::Epsilon);
+        Self::of(model, (&spread, targets), &coverage, None, measured_on)
+    }
+
     /// Measures `model` on input samples against target samples, with what `coverage` says of the target domain, all in the domains'
     /// units.
     pub fn of(
@@ -226,6 +266,83 @@ mod tests {
         assert_eq!(all, targets(3));
         assert_ne!(all, targets(4));
         assert_ne!(all, measuring_targets(3));
+    }
+
+    /// Sums of two angles each: smooth, without folds.
+    fn smooth() -> Model {
+        let mut f = trainer::network::Network::zeros(25, 4, 4);
+        for axis in 0..4 {
+            f.w1[axis * 25 + 4 * axis + 5] = 0.9;
+            f.w1[axis * 25 + 4 * axis + 6] = 0.4;
+            f.w2[axis * 4 + axis] = 0.9;
+            f.b2[axis] = -0.8;
+        }
+        Model {
+            g: trainer::network::Network::zeros(4, 4, 25),
+            f,
+            q: Normalisation::identity(25),
+            x: Normalisation::gripper(4),
+            metadata: Default::default(),
+        }
+    }
+
+    /// Every joint to and fro, `rate` frames a second, 40 s.
+    fn motion(rate: usize) -> Matrix {
+        let rows: Vec<[f32; 25]> = (0..40 * rate)
+            .map(|k| {
+                let t = k as f32 / rate as f32;
+                core::array::from_fn(|j| {
+                    let pace = 0.9 + 0.21 * j as f32;
+                    0.7 + 0.7 * (pace * t + j as f32).sin()
+                })
+            })
+            .collect();
+        Matrix::from_rows(&rows)
+    }
+
+    #[test]
+    fn the_same_motion_sampled_more_often_has_the_same_measures() {
+        let of = |rate| {
+            Quality::of(
+                &smooth(),
+                &motion(rate),
+                &measuring_targets(1),
+                String::new(),
+            )
+        };
+        let seldom = of(30);
+        assert!(seldom.volume_occupancy > 0.02, "{seldom:?}");
+        for rate in [60, 120, 240] {
+            let often = of(rate);
+            for (name, a, b) in [
+                ("occupancy", seldom.volume_occupancy, often.volume_occupancy),
+                ("d-Knn", seldom.d_knn, often.d_knn),
+                ("distortion", seldom.mean_distortion, often.mean_distortion),
+            ] {
+                assert!((b / a - 1.0).abs() < 0.15, "{rate} Hz, {name}: {a} and {b}");
+            }
+            assert_eq!(often.frames, MEASURED);
+        }
+    }
+
+    #[test]
+    fn the_paper_s_number_of_poses_is_measured_as_the_paper_does_and_a_handful_covers_little() {
+        let (model, targets) = (smooth(), measuring_targets(1));
+        let frames = motion(30);
+        let every = |step: usize| frames.select(&(0..1200).step_by(step).collect::<Vec<_>>());
+        for step in [5, 6] {
+            let some = every(step);
+            let ours = Measured::of_hand(&model, (&some, &targets), String::new());
+            let paper = Measured::of(&model, (&some, &targets), &GRIPPER, None, String::new());
+            assert_eq!(ours, paper, "{} frames", some.rows);
+        }
+        let few = every(60);
+        let ours = Measured::of_hand(&model, (&few, &targets), String::new());
+        let paper = Measured::of(&model, (&few, &targets), &GRIPPER, None, String::new());
+        let [ours_vo, paper_vo] = [&ours, &paper].map(|m| m.volume_occupancy.unwrap());
+        assert!(ours_vo < 0.7 * paper_vo, "{ours_vo} {paper_vo}");
+        let fault = Quality::from_measured(&ours).fault().unwrap();
+        assert!(fault.contains("20 poses are few"), "{fault}");
     }
 
     #[test]

@@ -47,6 +47,35 @@ fn a_checkpoint_of_other_options_or_none_at_all_is_refused() {
 }
 
 #[test]
+fn a_checkpoint_does_not_go_on_with_other_true_pairs() {
+    let files = Files::new();
+    let state = files.checkpoint("20");
+    let mut other = pairs();
+    other.targets.row_mut(3)[0] += 0.01;
+    files.write_truth("truth.csv", &other);
+    let said = files.refused(&["--resume", &state], 1);
+    assert!(
+        said.contains("other true pairs") && said.contains("--truth"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_flipped_bit_in_a_checkpoint_is_refused() {
+    let files = Files::new();
+    let state = files.checkpoint("20");
+    let bytes = std::fs::read(&state).unwrap();
+    let count = bytes.len();
+    for place in [9, 40, count / 3, count / 2, count - 1] {
+        let mut flipped = bytes.clone();
+        flipped[place] ^= 4;
+        std::fs::write(&state, flipped).unwrap();
+        let said = files.refused(&["--resume", &state], 1);
+        assert!(said.contains("not a usable checkpoint"), "{said}");
+    }
+}
+
+#[test]
 fn fewer_samples_than_pairs_are_counted() {
     let files = Files::new();
     let text = files.read("q.csv");

@@ -257,3 +257,33 @@ fn what_cannot_be_reproduced_is_said() {
     assert!(said.contains("file"), "{said}");
     assert_eq!(std::fs::read_to_string(&file).unwrap(), "taken");
 }
+
+#[test]
+fn a_hand_s_table_ends_soon_after_ctrl_c_and_goes_on_with_what_is_done() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let words = [
+        "reproduce",
+        "table4",
+        "--out",
+        out,
+        "--seeds",
+        "1",
+        "--threads",
+        "1",
+        "--epochs",
+        "4000",
+    ];
+    let child = command(&words)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(Duration::from_secs(2));
+    interrupt(&child);
+    let asked = std::time::Instant::now();
+    let output = finish(child);
+    let said = refusal(&output, 1);
+    assert!(said.contains("interrupted"), "{said}");
+    assert!(asked.elapsed() < Duration::from_secs(20));
+}

@@ -222,3 +222,145 @@ fn a_joint_that_rests_is_warned_of_by_its_name() {
         "{warned}"
     );
 }
+
+#[test]
+fn train_gives_the_verdict_that_eval_gives_and_few_rows_are_not_silently_fine() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let said = json(&run(&[
+        "train", "--poses", poses, "--out", out, "--epochs", "50", "--pairs", "1", "--json",
+    ]));
+    assert_eq!(said["good"], false, "{said}");
+    let warned = said["warnings"].to_string();
+    assert!(
+        warned.contains("not good enough to drive with") && warned.contains("24 poses are few"),
+        "{warned}"
+    );
+    let output = run(&["eval", "--model", out, "--poses", poses, "--json"]);
+    assert_eq!(json(&output)["good"], false);
+    let output = run(&["eval", "--model", out, "--poses", poses]);
+    assert!(
+        support::text(&output.stdout).contains("verdict            the map is not good enough")
+    );
+}
+
+#[test]
+fn a_long_recording_trains_as_a_short_one_and_that_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 2600);
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let output = run(&[
+        "train", "--poses", poses, "--out", out, "--epochs", "5", "--pairs", "1", "--json",
+    ]);
+    let noted = support::text(&output.stderr);
+    assert!(
+        noted.contains("of 2600 frames the 1000 that are farthest"),
+        "{noted}"
+    );
+    let said = json(&output);
+    assert_eq!(said["quality"]["frames"], 254);
+    // The digests are those of the whole file: eval knows it again.
+    let output = run(&["eval", "--model", out, "--poses", poses, "--json"]);
+    assert!(support::text(&output.stderr).contains("not held out"));
+}
+
+#[test]
+fn a_training_that_is_done_is_kept_though_its_measures_are_not_waited_for() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = |name: &str| folder.path().join(name).to_str().unwrap().to_owned();
+    let spiral = |count: usize| -> Vec<[f32; 2]> {
+        let point = |k: usize| [(k as f32 * 0.61).sin(), k as f32 / count as f32];
+        (0..count).map(point).collect()
+    };
+    let samples = |name: &str, prefix: &str, count: usize| {
+        let matrix = trainer::data::Matrix::from_rows(&spiral(count));
+        trainer::data::write_samples(file(name), &matrix, prefix).unwrap();
+    };
+    // Measuring takes seconds, training does not.
+    samples("q.csv", "q", 30_000);
+    samples("x.csv", "x", 2_000);
+    std::fs::write(file("p.csv"), "q0,q1,x0,x1\n0,0,0,0\n0.5,0.5,0.5,0.5\n").unwrap();
+    let (q, x, p, out) = (
+        file("q.csv"),
+        file("x.csv"),
+        file("p.csv"),
+        file("m.safetensors"),
+    );
+    let words = [
+        "train",
+        "--input",
+        &q,
+        "--target",
+        &x,
+        "--pairs-file",
+        &p,
+        "--out",
+        &out,
+        "--epochs",
+        "1",
+        "--hold-out",
+        "0.9",
+        "--hidden",
+        "8",
+        "--cost",
+        "pin",
+    ];
+    let child = command(&words)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let until = Instant::now() + Duration::from_secs(120);
+    while !folder.path().join("m.safetensors").exists() {
+        assert!(Instant::now() < until, "no model");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    interrupt(&child);
+    let output = finish(child);
+    let said = refusal(&output, 1);
+    assert!(said.contains("without its measures"), "{said}");
+    assert!(support::text(&output.stderr).contains("try: gauntlet eval --model"));
+    let model = trainer::model::Model::load(&out).unwrap();
+    assert_eq!(model.metadata["pairs"], "2");
+    assert!(!model.metadata.contains_key("dbar"));
+}
+
+#[test]
+fn tables_of_other_programs_train_and_what_was_done_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let plain = support::poses_text(60);
+    let file = folder.path().join("hand.csv");
+    let out = folder.path().join("m.safetensors");
+    let train = |text: &str| {
+        std::fs::write(&file, text).unwrap();
+        let output = run(&[
+            "train",
+            "--poses",
+            file.to_str().unwrap(),
+            "--out",
+            out.to_str().unwrap(),
+            "--epochs",
+            "5",
+            "--pairs",
+            "1",
+        ]);
+        let noted = support::text(&output.stderr);
+        assert_eq!(output.status.code(), Some(0), "{noted}");
+        noted
+    };
+    train(&plain);
+    let model = std::fs::read(&out).unwrap();
+    let semicolons = plain.replace(',', ";").replace('.', ",");
+    let noted = train(&semicolons);
+    assert!(
+        noted.contains("hand.csv: semicolons") && noted.contains("decimal marks"),
+        "{noted}"
+    );
+    assert!(model == std::fs::read(&out).unwrap(), "another model");
+    let noted = train(&format!("Recorded today\n\n{plain}"));
+    assert!(noted.contains("above the header"), "{noted}");
+    assert!(model == std::fs::read(&out).unwrap(), "another model");
+}

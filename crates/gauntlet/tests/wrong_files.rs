@@ -226,3 +226,114 @@ fn help_of_every_verb_shows_an_example() {
         );
     }
 }
+
+/// The model without its digests, as earlier versions wrote it.
+fn earlier(bytes: &[u8]) -> Vec<u8> {
+    let length = u64::from_le_bytes(bytes[..8].try_into().unwrap()) as usize;
+    let mut header: serde_json::Value = serde_json::from_slice(&bytes[8..8 + length]).unwrap();
+    let metadata = header["__metadata__"].as_object_mut().unwrap();
+    metadata.remove("weights_sha256").unwrap();
+    metadata.remove("metadata_sha256").unwrap();
+    let header = header.to_string();
+    let mut all = (header.len() as u64).to_le_bytes().to_vec();
+    all.extend_from_slice(header.as_bytes());
+    all.extend_from_slice(&bytes[8 + length..]);
+    all
+}
+
+#[test]
+fn every_verb_refuses_a_model_with_a_flipped_bit_and_takes_an_earlier_one_with_a_warning() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let file = folder.path().join("flipped.safetensors");
+    let image = folder.path().join("weights.hae");
+    let bytes = std::fs::read(model()).unwrap();
+    let verbs = [
+        &["eval", "--model", path(&file), "--poses", path(&poses)][..],
+        &["export", path(&file), "--out", path(&image)],
+        &["flash", path(&file), "--bridge", "unix:/nowhere"],
+        &[
+            "teleop",
+            "--model",
+            path(&file),
+            "--glove",
+            "/nowhere",
+            "--gripper",
+            "/nowhere",
+        ],
+    ];
+    // In a weight, in a digit of what is said, in the name of the digest.
+    let find = |word: &str| {
+        bytes
+            .windows(word.len())
+            .position(|w| w == word.as_bytes())
+            .unwrap()
+    };
+    for place in [
+        bytes.len() - 4001,
+        find("\"seed\":\"") + 8,
+        find("weights_sha256"),
+    ] {
+        let mut flipped = bytes.clone();
+        flipped[place] ^= 1;
+        std::fs::write(&file, &flipped).unwrap();
+        for verb in verbs {
+            let error = refusal(&run(verb), 1);
+            assert!(
+                error.contains("flipped.safetensors") && error.contains("damaged"),
+                "{}: {error}",
+                verb[0]
+            );
+        }
+    }
+    assert!(!image.exists());
+    std::fs::write(&file, earlier(&bytes)).unwrap();
+    for verb in &verbs[..2] {
+        let output = run(verb);
+        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        assert!(text(&output.stderr).contains("no digest"), "{}", verb[0]);
+    }
+}
+
+#[test]
+fn outputs_that_cannot_be_written_are_refused_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let long = folder.path().join("n".repeat(250));
+    let out = folder.path().join("m.safetensors");
+    let same = folder.path().join(".").join("m.safetensors");
+    for (out, checkpoint) in [
+        (&long, None),
+        (&std::path::PathBuf::from("/proc/m"), None),
+        (&out, Some(&long)),
+        (&out, Some(&same)),
+    ] {
+        let mut words = vec!["train", "--poses", path(&poses), "--out", path(out)];
+        words.extend(["--schedule", "paper"]);
+        if let Some(checkpoint) = checkpoint {
+            words.extend(["--checkpoint", path(checkpoint)]);
+        }
+        let error = refusal(&run(&words), 2);
+        assert!(error.contains("is not written"), "{error}");
+    }
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn text_in_another_encoding_is_named_with_the_way_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = folder.path().join("poses.csv");
+    let wide: Vec<u8> = poses_text(60)
+        .encode_utf16()
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    std::fs::write(&poses, &wide).unwrap();
+    let out = folder.path().join("m");
+    let output = run(&["train", "--poses", path(&poses), "--out", path(&out)]);
+    let error = refusal(&output, 1);
+    assert!(
+        error.contains("UTF-16") && error.contains("UTF-8"),
+        "{error}"
+    );
+    assert!(text(&output.stderr).contains("try: iconv -f UTF-16LE"));
+}

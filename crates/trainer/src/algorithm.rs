@@ -5,6 +5,7 @@
 
 mod check;
 pub mod checkpoint;
+mod clock;
 mod settings;
 #[cfg(test)]
 mod tests;
@@ -23,9 +24,9 @@ use crate::neighbours::{farthest, rows};
 use crate::network::Network;
 use crate::operator::{self, Operator};
 use crate::random::Random;
+use clock::Clock;
 use core::ops::ControlFlow;
 use core::time::Duration;
-use std::time::Instant;
 
 /// Streams of random numbers of one seed.
 const WEIGHT_STREAM: u64 = 0x5745_4947;
@@ -190,6 +191,7 @@ impl Trainer {
             self.pair_if_due(operator)?;
             self.step();
             clock.tick(self);
+            clock.probe(self);
             let every = self.settings.report_every.max(1);
             let is_report_due = self.epoch.is_multiple_of(every) || self.epoch == self.total();
             if is_report_due && !self.engine.parameters().iter().all(|p| p.is_finite()) {
@@ -340,60 +342,4 @@ fn batches(x: &Matrix, count: usize, seed: u64) -> Vec<Matrix> {
     (0..count)
         .map(|b| x.select(&order[b * x.rows / count..(b + 1) * x.rows / count]))
         .collect()
-}
-
-/// Estimates the time left, from the time of the steps so far, with and without attraction.
-struct Clock {
-    last: Instant,
-    /// Smoothed seconds a step, without and with attraction.
-    seconds: [f64; 2],
-}
-
-impl Clock {
-    fn start(trainer: &mut Trainer) -> Self {
-        let full = trainer.settings.cost.weights(&trainer.settings.lambda);
-        let none = Weights {
-            attraction: 0.0,
-            ..full
-        };
-        let seconds = [none, full].map(|weights| {
-            let start = Instant::now();
-            let _ = trainer.engine.evaluate(&weights, 0);
-            start.elapsed().as_secs_f64()
-        });
-        Self {
-            last: Instant::now(),
-            seconds,
-        }
-    }
-
-    fn tick(&mut self, trainer: &Trainer) {
-        let now = Instant::now();
-        let with = usize::from(trainer.weights(trainer.epoch.saturating_sub(1)).attraction != 0.0);
-        // A pause for a person's answer is not the step's time: take no more than ten times the usual.
-        let elapsed = (now - self.last)
-            .as_secs_f64()
-            .min(10.0 * self.seconds[with]);
-        self.seconds[with] += 0.05 * (elapsed - self.seconds[with]);
-        self.last = now;
-    }
-
-    /// Leaves the time since the last step out.
-    fn rest(&mut self) {
-        self.last = Instant::now();
-    }
-
-    fn remaining(&self, trainer: &Trainer) -> Duration {
-        let total = trainer.total();
-        let attracts = trainer.weights(total.saturating_sub(1)).attraction != 0.0;
-        let start = trainer.plan.stage_epochs * trainer.early_stages() + trainer.plan.ramp_start;
-        let with = if attracts {
-            total.saturating_sub(start.max(trainer.epoch))
-        } else {
-            0
-        };
-        let without = total - trainer.epoch - with;
-        let seconds = without as f64 * self.seconds[0] + with as f64 * self.seconds[1];
-        Duration::try_from_secs_f64(seconds).unwrap_or_default()
-    }
 }

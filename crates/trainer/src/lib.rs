@@ -24,5 +24,6 @@ pub(crate) mod pool;
 pub(crate) mod random;
 pub mod reproduce;
 pub mod shapes;
+pub mod spread;
 pub mod table3;
 pub mod whole_file;

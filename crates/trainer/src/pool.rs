@@ -11,7 +11,7 @@ use std::thread::JoinHandle;
 /// How often the helper looks for work before it sleeps: about 20 µs.
 const SPINS: u32 = 4000;
 
-/// A pool of `threads` threads, the caller's own counted.
+/// A pool of `threads` threads, the caller's own counted. A job has it to itself: nested calls do not compile.
 pub(crate) struct Pool {
     shared: Arc<Shared>,
     helpers: Vec<JoinHandle<()>>,
@@ -130,8 +130,9 @@ impl Pool {
         self.alone = alone;
     }
 
-    /// Calls `work` once for each item, on whichever thread is free.
-    pub(crate) fn for_each<T: Send>(&self, items: &mut [T], work: impl Fn(&mut T) + Sync) {
+    /// Calls `work` once for each item, on whichever thread is free. One call at a time: `work` itself cannot call it again, which
+    /// would take the job out from under the first.
+    pub(crate) fn for_each<T: Send>(&mut self, items: &mut [T], work: impl Fn(&mut T) + Sync) {
         if self.alone || self.helpers.is_empty() || items.len() < 2 {
             return items.iter_mut().for_each(work);
         }
@@ -257,7 +258,7 @@ mod tests {
 
     #[test]
     fn every_item_is_worked_on_once() {
-        let pool = Pool::new(2);
+        let mut pool = Pool::new(2);
         let mut items: Vec<u32> = (0..100).collect();
         for _ in 0..1000 {
             pool.for_each(&mut items, |item| *item += 1);
@@ -267,7 +268,7 @@ mod tests {
 
     #[test]
     fn a_panic_in_a_piece_reaches_the_caller_and_leaves_the_pool_usable() {
-        let pool = Pool::new(2);
+        let mut pool = Pool::new(2);
         let result = std::panic::catch_unwind(core::panic::AssertUnwindSafe(|| {
             pool.for_each(&mut [0_u32; 64], |_| panic!("planned"));
         }));

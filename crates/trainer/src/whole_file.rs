@@ -1,27 +1,47 @@
 //! Files that appear whole or not at all: written beside their place under a passing name, then renamed.
 
 use std::io::Write;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Writes `bytes` to `path`. A reader, or a person after a power cut, sees the old file or the new one, never a half.
 ///
 /// # Errors
 /// What the system says; the passing file is removed.
 pub fn write(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
-    let mut name = path
-        .file_name()
-        .ok_or_else(|| std::io::Error::other("the path names no file"))?
-        .to_owned();
-    name.push(format!(".{}.part", std::process::id()));
-    let part = path.with_file_name(name);
-    let written = std::fs::File::create(&part)
-        .and_then(|mut file| file.write_all(bytes).and_then(|()| file.sync_all()))
-        .and_then(|()| std::fs::rename(&part, path));
+    let part = passing(path)?;
+    let written = fill(&part, bytes).and_then(|()| std::fs::rename(&part, path));
     if written.is_err() {
         // Best effort: the first error is the one to tell.
         let _ = std::fs::remove_file(&part);
     }
     written
+}
+
+/// Tries whether a file of `length` bytes could be written to `path` now: the folder takes a name, the disk has room. Leaves nothing.
+///
+/// # Errors
+/// What the system says.
+pub fn probe(path: &Path, length: usize) -> std::io::Result<()> {
+    let part = passing(path)?;
+    let written = fill(&part, &vec![0; length]);
+    let removed = std::fs::remove_file(&part);
+    written.and(removed)
+}
+
+/// The passing name of a file that is being written.
+fn passing(path: &Path) -> std::io::Result<PathBuf> {
+    let mut name = path
+        .file_name()
+        .ok_or_else(|| std::io::Error::other("the path names no file"))?
+        .to_owned();
+    name.push(format!(".{}.part", std::process::id()));
+    Ok(path.with_file_name(name))
+}
+
+fn fill(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
+    let mut file = std::fs::File::create(path)?;
+    file.write_all(bytes)?;
+    file.sync_all()
 }
 
 #[cfg(test)]
@@ -42,5 +62,18 @@ mod tests {
         let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
         assert_eq!(names.len(), 2);
         assert!(write(&folder.path().join("no/such/folder"), b"x").is_err());
+    }
+
+    #[test]
+    fn a_probe_leaves_nothing_and_says_what_a_write_would() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("kept");
+        probe(&path, 1 << 16).unwrap();
+        write(&path, b"old").unwrap();
+        probe(&path, 1 << 16).unwrap();
+        assert_eq!(std::fs::read(&path).unwrap(), b"old");
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+        assert!(probe(&folder.path().join("no/such/folder"), 1).is_err());
+        assert!(probe(&folder.path().join("n".repeat(250)), 1).is_err());
     }
 }

@@ -134,6 +134,7 @@ fn devices(
     let parts = Parts {
         glove: probe::open_glove(glove.path(), interrupt)?.port,
         gripper: gripper_port,
+        line: crate::line::Settings::default(),
         image,
         config: bridge::Config::default(),
     };

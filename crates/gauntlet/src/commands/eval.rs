@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use clap::{ArgGroup, Args};
 use serde_json::json;
-use trainer::data::{Matrix, read_samples, read_truth, require_rows, sha256};
+use trainer::data::{Matrix, require_rows, sha256};
 use trainer::measures::NEIGHBOURS;
 use trainer::model::Model;
 
@@ -13,7 +13,10 @@ use super::train::CoverageArgs;
 use crate::failure::{Failure, told};
 use crate::poses::Motion;
 use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Measured, Quality, measuring_targets};
-use crate::training::{domains::matching, sorted};
+use crate::training::{
+    domains::{matching, pairs, samples},
+    sorted,
+};
 use crate::{model, note, out, say};
 
 /// Options of `eval`.
@@ -96,9 +99,9 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
     }
     say!("model              {}", options.model.display());
     say!(
-        "measured on        {}, all {} frames",
-        poses.display(),
-        quality.frames
+        "measured on        {} {}",
+        quality.frames,
+        quality.measured_on
     );
     say!("mean distortion    {:.3}", quality.mean_distortion);
     say!(
@@ -109,18 +112,28 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
         "d-Knn              {:.3}   (good: {GREATEST_D_KNN} or less)",
         quality.d_knn
     );
+    say!(
+        "verdict            {}",
+        quality
+            .fault()
+            .as_deref()
+            .unwrap_or("good enough to drive with")
+    );
     trained_with(&model);
     Ok(())
 }
 
 fn of_domains(options: &Eval, input: &Path, target: &Path) -> Result<()> {
-    let inputs = read_samples(input, "q").map_err(told)?;
-    let targets = read_samples(target, "x").map_err(told)?;
+    let inputs = samples(input, "q")?;
+    let targets = samples(target, "x")?;
     require_rows(input, inputs.rows, NEIGHBOURS + 1).map_err(told)?;
-    let model = Model::load_for(&options.model, inputs.cols, targets.cols).map_err(told)?;
+    let model = model::load_any(&options.model)?;
+    model
+        .require_shape(&options.model, inputs.cols, targets.cols)
+        .map_err(told)?;
     let truth = match &options.truth {
         Some(file) => {
-            let truth = read_truth(file).map_err(told)?;
+            let truth = pairs(file)?;
             let found = [truth.inputs.cols, truth.targets.cols];
             if found != [inputs.cols, targets.cols] {
                 let what = format!(

@@ -6,7 +6,7 @@ use std::path::Path;
 use anyhow::Result;
 use trainer::algorithm::{Nobody, PairPlan};
 use trainer::cost::Lambda;
-use trainer::data::{Matrix, Pairs, read_samples, read_truth, split};
+use trainer::data::{Columns, Matrix, Pairs, Table, sha256, split};
 use trainer::measures::{Coverage, NEIGHBOURS};
 use trainer::model::Normalisation;
 use trainer::operator::{GroundTruth, Operator};
@@ -14,6 +14,7 @@ use trainer::operator::{GroundTruth, Operator};
 use super::{Task, Units};
 use crate::commands::train::{PairChoice, PairKind};
 use crate::failure::{Failure, told};
+use crate::poses::tell_notes;
 
 /// Pairs where nothing else is said (§3.2.3).
 const PAIRS: usize = 4;
@@ -46,6 +47,31 @@ pub struct Request<'a> {
     pub hold_out: f64,
 }
 
+/// The samples of a file, columns `<prefix>0`…
+///
+/// # Errors
+/// A failure that names the file and what is wrong with it.
+pub fn samples(file: &Path, prefix: &str) -> Result<Matrix> {
+    let mut table = Table::open(file, Columns::Numbered(&[prefix])).map_err(told)?;
+    let samples = table.samples(prefix).map_err(told)?;
+    tell_notes(file, &table);
+    Ok(samples)
+}
+
+/// The pairs of a file, columns `q0…` and `x0…`.
+///
+/// # Errors
+/// A failure that names the file and what is wrong with it.
+pub fn pairs(file: &Path) -> Result<Pairs> {
+    let mut table = Table::open(file, Columns::Numbered(&["q", "x"])).map_err(told)?;
+    let pairs = Pairs {
+        inputs: table.samples("q").map_err(told)?,
+        targets: table.samples("x").map_err(told)?,
+    };
+    tell_notes(file, &table);
+    Ok(pairs)
+}
+
 /// A file of samples with what was read from it.
 struct Samples<'a> {
     file: &'a Path,
@@ -55,7 +81,7 @@ struct Samples<'a> {
 
 impl<'a> Samples<'a> {
     fn read(file: &'a Path, prefix: &'static str) -> Result<Self> {
-        let values = read_samples(file, prefix).map_err(told)?;
+        let values = samples(file, prefix)?;
         Ok(Self {
             file,
             prefix,
@@ -144,7 +170,10 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
             x: Normalisation::identity(target.values.cols),
         }
     };
+    let answers = (truth.as_ref()).map(|pairs| sha256(&[&pairs.inputs, &pairs.targets]));
     Ok(Task {
+        is_hand: false,
+        answers,
         truth: truth.map(|truth| matching(&truth, &held_out)),
         training,
         held_out,
@@ -182,7 +211,7 @@ fn refuse_one_point(target: &Samples<'_>) -> Result<()> {
 
 /// Pairs of the two domains from a file.
 fn pairs_of(file: &Path, input: &Samples<'_>, target: &Samples<'_>, force: bool) -> Result<Pairs> {
-    let pairs = read_truth(file).map_err(told)?;
+    let pairs = pairs(file)?;
     for (part, samples) in [(&pairs.inputs, input), (&pairs.targets, target)] {
         let (prefix, values) = (samples.prefix, &samples.values);
         if part.cols != values.cols {

@@ -8,10 +8,11 @@ use glove::hand::{JOINT_NAMES, LIMITS};
 use gripper::space;
 use trainer::algorithm::{PairPlan, Schedule};
 use trainer::cost::Lambda;
-use trainer::data::{Matrix, Pairs, read_pairs, split};
+use trainer::data::{Columns, Matrix, Pairs, Table, split};
 use trainer::measures::NEIGHBOURS;
 use trainer::model::{Model, Normalisation};
 use trainer::operator::{Operator, Scripted, start_pairs};
+use trainer::spread::spread;
 use trainer::table3;
 
 use super::domains::first;
@@ -19,12 +20,15 @@ use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};
 use crate::commands::train::{PairChoice, PairKind};
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
-use crate::poses::Motion;
+use crate::note;
+use crate::poses::{Motion, tell_notes};
 use crate::quality::{GRIPPER, Quality, measuring_targets, targets};
 use crate::record::{AXES, AXIS_NAMES};
 
 /// Pairs where nothing else is said (§3.3.4).
 const PAIRS: usize = 8;
+/// Frames to train and measure on: more of them are neighbours of these (the paper's recording has 635).
+pub const MOST_FRAMES: usize = 1000;
 
 /// A training with adaptive pairs, as the demo does it.
 #[derive(Debug)]
@@ -97,7 +101,8 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
             return Err(Failure::interrupted(&what).into());
         }
     };
-    let (model, measured) = task.model(&course, &learned, interrupt)?;
+    let mut model = task.model(&course, &learned);
+    let measured = task.measure(&mut model, interrupt)?;
     Ok(Outcome {
         quality: Quality::from_measured(&measured),
         model,
@@ -124,11 +129,19 @@ pub struct HandPairs<'a> {
 /// A failure that names the file and what is wrong with it.
 pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -> Result<Task> {
     let inputs = motion.frames();
-    let parts = split(inputs.rows, 1.0 - hold_out, seed);
-    let training = inputs.select(&parts.train);
+    let frames = inputs.select(&spread(&inputs, MOST_FRAMES));
+    if frames.rows < inputs.rows {
+        note!(
+            "note: of {} frames the {} that are farthest from one another are taken: the others are near to them",
+            inputs.rows,
+            frames.rows
+        );
+    }
+    let parts = split(frames.rows, 1.0 - hold_out, seed);
+    let training = frames.select(&parts.train);
     let enough = parts.test.len() > NEIGHBOURS;
     let held_out = if enough {
-        inputs.select(&parts.test)
+        frames.select(&parts.test)
     } else {
         training.clone()
     };
@@ -154,6 +167,8 @@ pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -
         measuring: measuring_targets(seed),
         truth: None,
         coverage: GRIPPER,
+        is_hand: true,
+        answers: None,
         inputs,
         units,
         pairs,
@@ -231,7 +246,10 @@ fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPla
 
 /// The pairs of a file, radians and counts, targets the gripper can take.
 fn from_file(file: &Path) -> Result<Pairs> {
-    let pairs = read_pairs(file, &JOINT_NAMES, &AXIS_NAMES).map_err(told)?;
+    let columns: Vec<&str> = JOINT_NAMES.iter().chain(&AXIS_NAMES).copied().collect();
+    let mut table = Table::open(file, Columns::Named(&columns)).map_err(told)?;
+    let pairs = (table.hand_pairs(&JOINT_NAMES, &AXIS_NAMES)).map_err(told)?;
+    tell_notes(file, &table);
     for (row, target) in pairs.targets.iter_rows().enumerate() {
         let Ok(counts) = <[f32; AXES]>::try_from(target) else {
             continue;

@@ -2,14 +2,15 @@
 
 pub mod domains;
 pub mod hand;
+mod learn;
 mod told;
 
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::sync::mpsc::RecvTimeoutError;
+use std::time::Duration;
 
 use anyhow::Result;
-use trainer::algorithm::{Error, InUnits, PairPlan, Plan, Schedule, Settings, Trained, Trainer};
+use trainer::algorithm::{PairPlan, Plan, Schedule, Settings, Trained};
 use trainer::cost::{Cost, Lambda};
 use trainer::data::{Matrix, Pairs, sha256};
 use trainer::measures::Coverage;
@@ -18,17 +19,14 @@ use trainer::network::{HIDDEN, Initialisation};
 use trainer::operator::Operator;
 
 pub use hand::{Outcome, Request, train};
+pub use learn::learn;
 
-use crate::failure::{Failure, told};
+use crate::failure::Failure;
 use crate::interrupt::Interrupt;
-use crate::progress::Progress;
 use crate::quality::Measured;
-use told::Told;
 
 /// Share of the frames that train; the rest measure (381 + 254 of the paper's 635).
 const TRAINING_SHARE: f64 = 0.6;
-/// A state is kept so often.
-const KEEP_EVERY: Duration = Duration::from_secs(60);
 /// Epochs between two looks at the clock: often enough for a smooth bar and a prompt Ctrl-C.
 const REPORT_EVERY: usize = 10;
 
@@ -47,6 +45,10 @@ pub struct Task {
     /// True pairs to measure with.
     truth: Option<Pairs>,
     coverage: Coverage,
+    /// Measured as the verdict on a hand's map is.
+    is_hand: bool,
+    /// Digest of the true pairs, which answer for reference pairs.
+    answers: Option<String>,
     units: Units,
     pairs: PairPlan,
     operator: Box<dyn Operator>,
@@ -168,6 +170,7 @@ impl Course {
             alpha: self.alpha.unwrap_or(usual_alpha),
         };
         settings.schedule = Schedule::Custom(self.plan(task.targets.cols));
+        settings.answers = task.answers.clone();
         settings.hidden = self.hidden;
         settings.initialisation = self.initialisation;
         settings.threads = self.threads.unwrap_or(settings.threads);
@@ -247,16 +250,8 @@ impl Task {
         )
     }
 
-    /// The model of a trained map with everything that is known about it, and its measures.
-    ///
-    /// # Errors
-    /// A failure when the end was asked for meanwhile.
-    pub fn model(
-        &self,
-        course: &Course,
-        learned: &Learned,
-        interrupt: &Interrupt,
-    ) -> Result<(Model, Measured)> {
+    /// The model of a trained map with everything that is known about it but its measures.
+    pub fn model(&self, course: &Course, learned: &Learned) -> Model {
         let mut model = Model {
             f: learned.trained.networks.f.clone(),
             g: learned.trained.networks.g.clone(),
@@ -264,56 +259,87 @@ impl Task {
             x: self.units.x.clone(),
             metadata: Default::default(),
         };
-        let measured = Measured::of(
-            &model,
-            (&self.held_out, &self.measuring),
-            &self.coverage,
-            self.truth.as_ref(),
-            self.measured_on.clone(),
-        );
-        if interrupt.asked() {
-            return Err(
-                Failure::interrupted("while the map was measured: no model was made").into(),
-            );
-        }
-        self.describe_in(&mut model, &course.settings(self), learned, &measured);
-        Ok((model, measured))
+        self.describe_in(&mut model, &course.settings(self), learned);
+        model
+    }
+
+    /// Measures the model and writes the measures into it.
+    ///
+    /// # Errors
+    /// A failure when the end was asked for meanwhile; the model is as it was.
+    pub fn measure(&self, model: &mut Model, interrupt: &Interrupt) -> Result<Measured> {
+        let (map, held_out, targets) =
+            (model.clone(), self.held_out.clone(), self.measuring.clone());
+        let (coverage, truth) = (self.coverage, self.truth.clone());
+        let (is_hand, measured_on) = (self.is_hand, self.measured_on.clone());
+        let measured = unless_asked(interrupt, move || {
+            let samples = (&held_out, &targets);
+            if is_hand {
+                Measured::of_hand(&map, samples, measured_on)
+            } else {
+                Measured::of(&map, samples, &coverage, truth.as_ref(), measured_on)
+            }
+        });
+        let Some(measured) = measured else {
+            return Err(Failure::interrupted("while the map was measured").into());
+        };
+        let entries = [
+            ("dbar", Some(measured.mean_distortion)),
+            ("vo", measured.volume_occupancy),
+            ("dknn", Some(measured.d_knn)),
+            ("nmse", measured.nmse),
+        ];
+        let known = entries
+            .into_iter()
+            .filter_map(|(key, value)| Some((key.to_owned(), value?.to_string())));
+        model.metadata.extend(known);
+        Ok(measured)
     }
 
     /// Writes what is known about the training into the model.
-    fn describe_in(
-        &self,
-        model: &mut Model,
-        settings: &Settings,
-        learned: &Learned,
-        measured: &Measured,
-    ) {
+    fn describe_in(&self, model: &mut Model, settings: &Settings, learned: &Learned) {
         let lambda = &settings.lambda;
         let entries = [
-            ("cost", Some(settings.cost.name().to_owned())),
-            ("alpha", Some(lambda.alpha.to_string())),
+            ("cost", settings.cost.name().to_owned()),
+            ("alpha", lambda.alpha.to_string()),
             (
                 "lambda",
-                Some(format!(
-                    "{} {} {}",
-                    lambda.distortion, lambda.pin, lambda.attraction
-                )),
+                format!("{} {} {}", lambda.distortion, lambda.pin, lambda.attraction),
             ),
-            ("pairs", Some(learned.trained.pairs.inputs.rows.to_string())),
-            ("seed", Some(settings.seed.to_string())),
-            ("epochs", Some(learned.trained.epochs.to_string())),
-            ("data_sha256", Some(sha256(&[&self.inputs, &self.targets]))),
-            ("input_sha256", Some(sha256(&[&self.inputs]))),
-            ("training_sha256", Some(sha256(&[&sorted(&self.training)]))),
-            ("dbar", Some(measured.mean_distortion.to_string())),
-            ("vo", measured.volume_occupancy.map(|vo| vo.to_string())),
-            ("dknn", Some(measured.d_knn.to_string())),
-            ("nmse", measured.nmse.map(|nmse| nmse.to_string())),
+            ("pairs", learned.trained.pairs.inputs.rows.to_string()),
+            ("seed", settings.seed.to_string()),
+            ("epochs", learned.trained.epochs.to_string()),
+            ("data_sha256", sha256(&[&self.inputs, &self.targets])),
+            ("input_sha256", sha256(&[&self.inputs])),
+            ("training_sha256", sha256(&[&sorted(&self.training)])),
         ];
         model.metadata = entries
             .into_iter()
-            .filter_map(|(key, value)| Some((key.to_owned(), value?)))
+            .map(|(key, value)| (key.to_owned(), value))
             .collect();
+    }
+}
+
+/// What `work` gives, on a thread of its own; `None` when the end is asked for first, which does not wait for it.
+fn unless_asked<T: Send + 'static>(
+    interrupt: &Interrupt,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> Option<T> {
+    let (give, take) = std::sync::mpsc::channel();
+    let worker = std::thread::spawn(move || {
+        // Nobody takes it when the end was asked for.
+        let _ = give.send(work());
+    });
+    loop {
+        match take.recv_timeout(Duration::from_millis(50)) {
+            Ok(value) => return Some(value),
+            Err(RecvTimeoutError::Timeout) if interrupt.asked() => return None,
+            Err(RecvTimeoutError::Timeout) => {}
+            Err(RecvTimeoutError::Disconnected) => match worker.join() {
+                Err(panic) => std::panic::resume_unwind(panic),
+                Ok(()) => return None,
+            },
+        }
     }
 }
 
@@ -323,132 +349,4 @@ pub(crate) fn sorted(samples: &Matrix) -> Matrix {
     let bits = |row: usize| samples.row(row).iter().map(|value| value.to_bits());
     order.sort_by(|&a, &b| bits(a).cmp(bits(b)));
     samples.select(&order)
-}
-
-/// Trains to the end, or to where it is to stop.
-///
-/// # Errors
-/// A failure that says what is wrong with the data, or that the training was broken off and where its state is kept.
-pub fn learn(task: &mut Task, course: &Course, interrupt: &Interrupt) -> Result<Ended> {
-    let settings = course.settings(task);
-    let (q, x) = (
-        task.units.q.apply_all(&task.training),
-        task.units.x.apply_all(&task.targets),
-    );
-    let mut trainer = Trainer::new(&q, &x, &settings).map_err(told)?;
-    if let Some(path) = &course.resume {
-        trainer
-            .load_checkpoint(path)
-            .map_err(|error| named(path, &error))?;
-    }
-    let units = task.units.clone();
-    let mut operator = InUnits {
-        operator: task.operator.as_mut(),
-        input: &units.q,
-        target: &units.x,
-    };
-    let total = trainer.total();
-    let mut told_so_far = Told {
-        progress: Progress::start("training", total as u64, course.quiet),
-        warnings: Vec::new(),
-        names: task.names,
-    };
-    loop {
-        let (ended, pause) = slice(
-            &mut trainer,
-            &mut operator,
-            course,
-            interrupt,
-            &mut told_so_far,
-        );
-        match (ended, pause) {
-            (Ok(trained), _) => {
-                let Told {
-                    progress, warnings, ..
-                } = told_so_far;
-                let took = progress.finish();
-                return Ok(Ended::Trained(Box::new(Learned {
-                    trained,
-                    took,
-                    warnings,
-                })));
-            }
-            (Err(Error::Stopped { epoch }), pause) => {
-                if let Some(path) = &course.checkpoint {
-                    trainer.save_checkpoint(path).map_err(told)?;
-                }
-                match pause {
-                    Pause::Keep => {}
-                    Pause::StopAt => return Ok(Ended::StoppedAt(epoch)),
-                    Pause::Interrupt => return Err(broken_off(course, epoch)),
-                }
-            }
-            (Err(other), _) => return Err(told(other)),
-        }
-    }
-}
-
-/// Why a training pauses.
-#[derive(Debug, Clone, Copy)]
-enum Pause {
-    /// To keep its state.
-    Keep,
-    /// It is where it was to stop.
-    StopAt,
-    /// A person asked.
-    Interrupt,
-}
-
-/// Trains until it is done or must pause.
-fn slice(
-    trainer: &mut Trainer,
-    operator: &mut dyn Operator,
-    course: &Course,
-    interrupt: &Interrupt,
-    told_so_far: &mut Told,
-) -> (std::result::Result<Trained, Error>, Pause) {
-    let started = Instant::now();
-    let mut pause = Pause::Interrupt;
-    let result = trainer.run(operator, &mut |step| {
-        told_so_far.show(step);
-        let is_done = step.epoch == step.total;
-        if interrupt.asked() {
-            pause = Pause::Interrupt;
-        } else if course.stop_at.is_some_and(|epoch| step.epoch >= epoch) && !is_done {
-            pause = Pause::StopAt;
-        } else if course.checkpoint.is_some() && started.elapsed() >= KEEP_EVERY && !is_done {
-            pause = Pause::Keep;
-        } else {
-            return ControlFlow::Continue(());
-        }
-        ControlFlow::Break(())
-    });
-    (result, pause)
-}
-
-fn named(path: &Path, error: &trainer::algorithm::checkpoint::Error) -> anyhow::Error {
-    let text = error.to_string();
-    let name = path.display().to_string();
-    if text.contains(&name) {
-        told(text)
-    } else {
-        told(format!("{name}: {text}"))
-    }
-}
-
-fn broken_off(course: &Course, epoch: usize) -> anyhow::Error {
-    match &course.checkpoint {
-        Some(path) => Failure::new(
-            format!(
-                "interrupted in the training, at epoch {epoch}: no model was made, the state is in {}",
-                path.display()
-            ),
-            format!("the same again with --resume {}", path.display()),
-        )
-        .into(),
-        None => Failure::interrupted(&format!(
-            "in the training, at epoch {epoch}: no model was made"
-        ))
-        .into(),
-    }
 }

@@ -16,11 +16,7 @@ impl Told {
     pub fn show(&mut self, step: &Step<'_>) {
         if let Some(warning) = &step.warning {
             let text = self.words(warning, step);
-            // A training that pauses looks at its end again.
-            if !self.warnings.contains(&text) {
-                self.progress.say(&format!("warning: {text}"));
-                self.warnings.push(text);
-            }
+            self.warn(text);
         }
         let is_spreading = step.weights.attraction > 0.0;
         self.progress
@@ -34,6 +30,14 @@ impl Told {
                     if is_spreading { ", spreading" } else { "" }
                 )
             });
+    }
+
+    /// A warning, once: a training that pauses looks at its end again.
+    pub fn warn(&mut self, text: String) {
+        if !self.warnings.contains(&text) {
+            self.progress.say(&format!("warning: {text}"));
+            self.warnings.push(text);
+        }
     }
 
     /// A warning of the map with its epoch, one of the data with the column's name.

@@ -7,10 +7,15 @@ use crate::whole_file;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
 use std::collections::HashMap;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Version of this file's meaning.
-const VERSION: &str = "2";
+const VERSION: &str = "3";
+/// No checkpoint is longer; what has no end is none.
+const LONGEST: u64 = 256 << 20;
+/// The key of the digest over everything else.
+const DIGEST: &str = "state_sha256";
 
 /// Why a checkpoint cannot be written or used.
 #[derive(Debug, thiserror::Error)]
@@ -46,6 +51,11 @@ pub enum Error {
         "the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed); use those it was made with"
     )]
     OtherSettings,
+    /// Of other answers.
+    #[error(
+        "the checkpoint was made with other true pairs (--truth), which answer for its reference pairs; use those it was made with"
+    )]
+    OtherAnswers,
 }
 
 fn broken(why: impl Into<String>) -> Error {
@@ -57,10 +67,34 @@ fn fingerprint(settings: &Settings) -> String {
     let same = Settings {
         threads: 0,
         report_every: 0,
+        answers: None,
         ..settings.clone()
     };
     let hash = Sha256::digest(format!("{same:?}").as_bytes());
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    hexadecimal(&hash)
+}
+
+fn hexadecimal(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// Over the words, in the order of their keys, and the arrays with their names and lengths.
+fn digest<'a>(
+    words: impl Iterator<Item = (&'a str, &'a str)>,
+    arrays: impl Iterator<Item = (&'a str, &'a [u8])>,
+) -> String {
+    let mut hash = Sha256::new();
+    let mut pieces: Vec<(&str, &[u8])> = words.map(|(k, v)| (k, v.as_bytes())).collect();
+    pieces.sort_unstable();
+    let mut arrays: Vec<(&str, &[u8])> = arrays.collect();
+    arrays.sort_unstable_by_key(|(name, _)| *name);
+    for (name, bytes) in pieces.into_iter().chain(arrays) {
+        hash.update(name.as_bytes());
+        hash.update([0]);
+        hash.update((bytes.len() as u64).to_le_bytes());
+        hash.update(bytes);
+    }
+    hexadecimal(&hash.finalize())
 }
 
 impl Trainer {
@@ -83,11 +117,14 @@ impl Trainer {
     /// Any of [`Error`]; then nothing has changed.
     pub fn load_checkpoint(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| Error::File {
-            verb: "read",
-            file: path.to_owned(),
-            source,
-        })?;
+        let mut bytes = Vec::new();
+        std::fs::File::open(path)
+            .and_then(|file| file.take(LONGEST).read_to_end(&mut bytes))
+            .map_err(|source| Error::File {
+                verb: "read",
+                file: path.to_owned(),
+                source,
+            })?;
         self.resume(&bytes)
     }
 
@@ -121,10 +158,20 @@ impl Trainer {
             ("pairs", self.pairs.inputs.rows.to_string()),
             ("data_sha256", sha256(&[&self.q, &self.x])),
             ("settings_sha256", fingerprint(&self.settings)),
+            (
+                "answers_sha256",
+                self.settings.answers.clone().unwrap_or_default(),
+            ),
         ];
+        let state = digest(
+            words.iter().map(|(key, value)| (*key, value.as_str())),
+            arrays.iter().map(|(name, _, bytes)| (*name, &bytes[..])),
+        );
+        let words = words.into_iter().chain([(DIGEST, state)]);
         let words = words.map(|(key, value)| (key.to_owned(), value));
         let views = views.map_err(|e: safetensors::SafeTensorError| broken(e.to_string()))?;
-        safetensors::serialize(views, Some(HashMap::from(words))).map_err(|e| broken(e.to_string()))
+        safetensors::serialize(views, Some(words.collect::<HashMap<_, _>>()))
+            .map_err(|e| broken(e.to_string()))
     }
 
     /// Goes on from a checkpoint's bytes.
@@ -145,6 +192,15 @@ impl Trainer {
         if word("version")? != VERSION {
             return Err(broken(format!("version {}", word("version")?)));
         }
+        let tensors = SafeTensors::deserialize(bytes).map_err(|e| broken(e.to_string()))?;
+        let all = tensors.tensors();
+        let state = digest(
+            (words.iter().filter(|(key, _)| *key != DIGEST)).map(|(k, v)| (k.as_str(), v.as_str())),
+            all.iter().map(|(name, view)| (name.as_str(), view.data())),
+        );
+        if *word(DIGEST)? != state {
+            return Err(broken("it is not as it was written: its digest is another"));
+        }
         let (found, expected) = (word("data_sha256")?, sha256(&[&self.q, &self.x]));
         if *found != expected {
             let start = |digits: &str| digits.chars().take(8).collect();
@@ -156,7 +212,9 @@ impl Trainer {
         if *word("settings_sha256")? != fingerprint(&self.settings) {
             return Err(Error::OtherSettings);
         }
-        let tensors = SafeTensors::deserialize(bytes).map_err(|e| broken(e.to_string()))?;
+        if *word("answers_sha256")? != self.settings.answers.clone().unwrap_or_default() {
+            return Err(Error::OtherAnswers);
+        }
         let array = |name: &str| floats(&tensors, name);
         let rows = number("pairs")? as usize;
         let matrix = |name: &str, cols: usize| {

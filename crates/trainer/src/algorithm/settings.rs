@@ -26,6 +26,8 @@ pub struct Settings {
     pub threads: usize,
     /// Epochs between two calls of the progress callback.
     pub report_every: usize,
+    /// Digest of what the operator answers from, where it answers from data: a checkpoint goes on with the same only.
+    pub answers: Option<String>,
 }
 
 impl Settings {
@@ -52,6 +54,7 @@ impl Settings {
             seed,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
             report_every: 50,
+            answers: None,
         }
     }
 }

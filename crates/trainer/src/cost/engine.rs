@@ -210,20 +210,15 @@ impl Engine {
         self.copies_f.take(self.machine, self.f, f);
         self.copies_g.take(self.machine, self.g, g);
     }
+}
 
-    fn nets(&self) -> [Net<'_>; 2] {
-        let (f, g) = self.parameters.split_at(self.f.len());
-        [
-            Net {
-                shape: self.f,
-                flat: f,
-                copies: &self.copies_f,
-            },
-            Net {
-                shape: self.g,
-                flat: g,
-                copies: &self.copies_g,
-            },
-        ]
-    }
+/// f and g of the shapes, from the flat weights of both and the copies of each.
+fn nets<'a>([f, g]: [Shape; 2], flat: &'a [f32], copies: [&'a Copies; 2]) -> [Net<'a>; 2] {
+    let (flat_f, flat_g) = flat.split_at(f.len());
+    let net = |shape, flat, copies| Net {
+        shape,
+        flat,
+        copies,
+    };
+    [net(f, flat_f, copies[0]), net(g, flat_g, copies[1])]
 }

@@ -1,8 +1,10 @@
 //! The CSV files: poses (`time_s`, `clip`, joint names), reference pairs (inputs then targets), samples `q0…` or `x0…` of any
-//! other domain. Columns are found by name, in any order; columns that nobody asked for are passed over.
+//! other domain. Columns are found by name, in any order; columns that nobody asked for are passed over. How tables are taken as people
+//! have them: [`Table`].
 
+use super::table::{Columns, Table};
 use super::{Error, Matrix};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Frames of joint angles.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -38,17 +40,13 @@ impl Pairs {
     }
 }
 
-/// Reads poses: the columns `joint_names` (radians), and `time_s` if there. Needs at least one frame.
+/// Reads poses: the columns `joint_names` (radians), and the time if there. Needs at least one frame. What is taken otherwise than
+/// it stands (degrees, decimal commas, clips) is told by [`Table::notes`].
 ///
 /// # Errors
 /// Any of [`Error`], with file, column, row and value.
 pub fn read_poses(path: impl AsRef<Path>, joint_names: &[&str]) -> Result<Poses, Error> {
-    let path = path.as_ref();
-    let file = std::fs::File::open(path).map_err(|source| Error::Read {
-        file: path.to_owned(),
-        source,
-    })?;
-    poses_from(file, path, joint_names)
+    Table::open(path, Columns::Named(joint_names))?.poses(joint_names)
 }
 
 /// As [`read_poses`], from any reader; `name` stands for the file in errors.
@@ -60,13 +58,7 @@ pub fn poses_from(
     name: &Path,
     joint_names: &[&str],
 ) -> Result<Poses, Error> {
-    let table = Table::read(reader, name)?;
-    let rows = table.angles(joint_names)?;
-    table.at_least(1)?;
-    Ok(Poses {
-        time_s: table.times()?,
-        rows,
-    })
+    Table::read(reader, name, Columns::Named(joint_names))?.poses(joint_names)
 }
 
 /// Reads a hand's pairs: the columns `inputs` (radians), then the columns `targets`. Needs at least one row.
@@ -78,13 +70,8 @@ pub fn read_pairs(
     inputs: &[&str],
     targets: &[&str],
 ) -> Result<Pairs, Error> {
-    let table = Table::open(path.as_ref())?;
-    let pairs = Pairs {
-        inputs: table.angles(inputs)?,
-        targets: table.columns(targets)?,
-    };
-    table.at_least(1)?;
-    Ok(pairs)
+    let names = [inputs, targets].concat();
+    Table::open(path, Columns::Named(&names))?.hand_pairs(inputs, targets)
 }
 
 /// Reads samples of any domain: the columns `<prefix>0`, `<prefix>1`, … as many as the header has. Needs at least one row.
@@ -92,10 +79,7 @@ pub fn read_pairs(
 /// # Errors
 /// Any of [`Error`]; a gap in the numbering is a missing column.
 pub fn read_samples(path: impl AsRef<Path>, prefix: &str) -> Result<Matrix, Error> {
-    let table = Table::open(path.as_ref())?;
-    let samples = table.numbered(prefix)?;
-    table.at_least(1)?;
-    Ok(samples)
+    Table::open(path, Columns::Numbered(&[prefix]))?.samples(prefix)
 }
 
 /// Reads ground truth of any two domains: columns `q0…` and `x0…`. Needs at least one row.
@@ -103,13 +87,11 @@ pub fn read_samples(path: impl AsRef<Path>, prefix: &str) -> Result<Matrix, Erro
 /// # Errors
 /// Any of [`Error`].
 pub fn read_truth(path: impl AsRef<Path>) -> Result<Pairs, Error> {
-    let table = Table::open(path.as_ref())?;
-    let pairs = Pairs {
-        inputs: table.numbered("q")?,
-        targets: table.numbered("x")?,
-    };
-    table.at_least(1)?;
-    Ok(pairs)
+    let mut table = Table::open(path, Columns::Numbered(&["q", "x"]))?;
+    Ok(Pairs {
+        inputs: table.samples("q")?,
+        targets: table.samples("x")?,
+    })
 }
 
 /// Writes poses as [`read_poses`] reads them, `time_s` first when there. The file appears whole or not at all.
@@ -178,213 +160,4 @@ where
         file: path.to_owned(),
         source,
     })
-}
-
-/// A CSV file in memory: every row has as many fields as the header, names are unique.
-struct Table {
-    file: PathBuf,
-    header: Vec<String>,
-    rows: Vec<(u64, csv::StringRecord)>,
-}
-
-impl Table {
-    fn open(path: &Path) -> Result<Self, Error> {
-        let file = std::fs::File::open(path).map_err(|source| Error::Read {
-            file: path.to_owned(),
-            source,
-        })?;
-        Self::read(file, path)
-    }
-
-    fn read(mut reader: impl std::io::Read, name: &Path) -> Result<Self, Error> {
-        let mut bytes = Vec::new();
-        reader
-            .read_to_end(&mut bytes)
-            .map_err(|source| Error::Read {
-                file: name.to_owned(),
-                source,
-            })?;
-        let mut reader = csv::ReaderBuilder::new()
-            .flexible(true)
-            .trim(csv::Trim::All)
-            .from_reader(&bytes[..]);
-        let header = reader.headers().map_err(|error| csv_error(name, error))?;
-        let header: Vec<String> = header
-            .iter()
-            // Spreadsheets put a byte order mark before the first name.
-            .map(|field| field.trim_start_matches('\u{feff}').to_owned())
-            .collect();
-        if header.iter().all(String::is_empty) {
-            return Err(Error::Empty {
-                file: name.to_owned(),
-            });
-        }
-        let mut rows = Vec::new();
-        for record in reader.into_records() {
-            let record = record.map_err(|error| csv_error(name, error))?;
-            let line = record.position().map_or(0, |place| line_of(place, &bytes));
-            if record.len() != header.len() {
-                return Err(Error::Ragged {
-                    file: name.to_owned(),
-                    line,
-                    row: rows.len() + 1,
-                    found: record.len(),
-                    expected: header.len(),
-                });
-            }
-            rows.push((line, record));
-        }
-        Ok(Self {
-            file: name.to_owned(),
-            header,
-            rows,
-        })
-    }
-
-    /// Where `column` stands, `None` if nowhere.
-    fn position(&self, column: &str) -> Result<Option<usize>, Error> {
-        let mut places = (0..self.header.len()).filter(|&i| self.header[i] == column);
-        let first = places.next();
-        if places.next().is_some() {
-            return Err(Error::DuplicateColumn {
-                file: self.file.clone(),
-                column: column.to_owned(),
-            });
-        }
-        Ok(first)
-    }
-
-    fn needed_position(&self, column: &str) -> Result<usize, Error> {
-        self.position(column)?.ok_or_else(|| Error::MissingColumn {
-            file: self.file.clone(),
-            column: column.to_owned(),
-            found: self.header.clone(),
-        })
-    }
-
-    fn columns<S: AsRef<str>>(&self, names: &[S]) -> Result<Matrix, Error> {
-        let places = names
-            .iter()
-            .map(|name| self.needed_position(name.as_ref()))
-            .collect::<Result<Vec<_>, _>>()?;
-        let mut values = Vec::with_capacity(places.len() * self.rows.len());
-        for row in 0..self.rows.len() {
-            for &place in &places {
-                values.push(self.number(row, place)? as f32);
-            }
-        }
-        Ok(Matrix {
-            rows: self.rows.len(),
-            cols: places.len(),
-            data: values,
-        })
-    }
-
-    /// Columns of joint angles, none beyond ±2π.
-    fn angles(&self, names: &[&str]) -> Result<Matrix, Error> {
-        let angles = self.columns(names)?;
-        let beyond = |angle: &f32| angle.abs() > core::f32::consts::TAU;
-        if let Some(place) = angles.data.iter().position(beyond) {
-            let row = place / angles.cols;
-            return Err(Error::NotRadians {
-                file: self.file.clone(),
-                line: self.rows[row].0,
-                row: row + 1,
-                column: names[place % angles.cols].to_owned(),
-                value: angles.data[place],
-            });
-        }
-        Ok(angles)
-    }
-
-    /// The columns `<prefix>0…`: as many as the highest number in the header asks for, at least one.
-    fn numbered(&self, prefix: &str) -> Result<Matrix, Error> {
-        let numbers = self
-            .header
-            .iter()
-            .filter_map(|name| name.strip_prefix(prefix)?.parse::<usize>().ok());
-        // A gap shows within the first `header.len()` numbers, so a wild number makes no long list.
-        let count = numbers.max().unwrap_or(0).min(self.header.len()) + 1;
-        let names: Vec<String> = (0..count).map(|i| format!("{prefix}{i}")).collect();
-        self.columns(&names)
-    }
-
-    /// A finite number that stays finite as f32.
-    fn number(&self, row: usize, place: usize) -> Result<f64, Error> {
-        let (line, record) = &self.rows[row];
-        let text = record.get(place).unwrap_or_default();
-        match text.parse::<f64>() {
-            Ok(value) if (value as f32).is_finite() => Ok(value),
-            Ok(_) => Err(Error::NotFinite {
-                file: self.file.clone(),
-                line: *line,
-                row: row + 1,
-                column: self.header[place].clone(),
-                value: text.to_owned(),
-            }),
-            Err(_) => Err(Error::NotNumeric {
-                file: self.file.clone(),
-                line: *line,
-                row: row + 1,
-                column: self.header[place].clone(),
-                value: text.to_owned(),
-            }),
-        }
-    }
-
-    fn times(&self) -> Result<Option<Vec<f64>>, Error> {
-        let Some(place) = self.position("time_s")? else {
-            return Ok(None);
-        };
-        let mut times: Vec<f64> = Vec::with_capacity(self.rows.len());
-        for row in 0..self.rows.len() {
-            let time_s = self.number(row, place)?;
-            if let Some(&before) = times.last()
-                && time_s <= before
-            {
-                return Err(Error::TimeNotIncreasing {
-                    file: self.file.clone(),
-                    line: self.rows[row].0,
-                    row: row + 1,
-                    time_s,
-                    before,
-                });
-            }
-            times.push(time_s);
-        }
-        Ok(Some(times))
-    }
-
-    fn at_least(&self, needed: usize) -> Result<(), Error> {
-        super::require_rows(&self.file, self.rows.len(), needed)
-    }
-}
-
-/// The line on which a record starts: its position is before the empty lines that were passed over.
-fn line_of(place: &csv::Position, bytes: &[u8]) -> u64 {
-    let start = usize::try_from(place.byte()).unwrap_or(usize::MAX);
-    let rest = bytes.get(start..).unwrap_or_default();
-    let empty = rest.iter().take_while(|byte| matches!(byte, b'\r' | b'\n'));
-    place.line() + empty.filter(|byte| **byte == b'\n').count() as u64
-}
-
-fn csv_error(file: &Path, error: csv::Error) -> Error {
-    let line = error.position().map_or(1, csv::Position::line);
-    let what = error.to_string();
-    match error.into_kind() {
-        csv::ErrorKind::Io(source) => Error::Read {
-            file: file.to_owned(),
-            source,
-        },
-        csv::ErrorKind::Utf8 { err, .. } => Error::NotCsv {
-            file: file.to_owned(),
-            line,
-            what: format!("field {} is not UTF-8", err.field() + 1),
-        },
-        _ => Error::NotCsv {
-            file: file.to_owned(),
-            line,
-            what,
-        },
-    }
 }

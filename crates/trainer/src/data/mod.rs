@@ -3,16 +3,25 @@
 //!
 //! Units are those of the file: radians for joint angles, counts for gripper positions. Normalisation is the model's business.
 
+mod angles;
 mod csv_file;
+mod error;
+mod names;
+mod table;
+mod text;
+mod times;
 
 pub use csv_file::{
     Pairs, Poses, poses_from, read_pairs, read_poses, read_samples, read_truth, write_pairs,
     write_poses, write_samples,
 };
 
+pub use error::Error;
+pub use table::{Columns, Table};
+
 use crate::random::Random;
 use sha2::{Digest, Sha256};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Row-major samples: `rows` samples of `cols` values each. `data.len() == rows * cols` always holds for matrices made here.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -172,181 +181,9 @@ pub fn sha256(matrices: &[&Matrix]) -> String {
         .collect()
 }
 
-/// What can be wrong with a file of samples. Rows are counted from 1 without the header; the line of the file comes with them.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// The file cannot be opened or read.
-    #[error(
-        "cannot read {}: {source}; check the path and that you may read it", file.display()
-    )]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file cannot be written.
-    #[error(
-        "cannot write {}: {source}; check that the folder exists and that you may write there", file.display()
-    )]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// Not text, or the quotes do not close.
-    #[error(
-        "{}, line {line}: not CSV text ({what}); save it as comma-separated UTF-8 text with one header line", file.display()
-    )]
-    NotCsv {
-        /// The file.
-        file: PathBuf,
-        /// Line of the fault, from 1.
-        line: u64,
-        /// What the reader said.
-        what: String,
-    },
-    /// No header line.
-    #[error(
-        "{} is empty; it needs a header line that names the columns, then one line a sample", file.display()
-    )]
-    Empty {
-        /// The file.
-        file: PathBuf,
-    },
-    /// A column that is needed is not in the header.
-    #[error(
-        "{}: column `{column}` is missing ({}); add it to the header line and to every row", file.display(), Named(found)
-    )]
-    MissingColumn {
-        /// The file.
-        file: PathBuf,
-        /// The missing column.
-        column: String,
-        /// The header as it stands.
-        found: Vec<String>,
-    },
-    /// A column is in the header twice.
-    #[error(
-        "{}: column `{column}` is in the header twice; remove or rename one of them", file.display()
-    )]
-    DuplicateColumn {
-        /// The file.
-        file: PathBuf,
-        /// The column.
-        column: String,
-    },
-    /// A row has more or fewer fields than the header.
-    #[error(
-        "{}, line {line} (row {row}): {found} fields, the header has {expected}; complete or remove this row", file.display()
-    )]
-    Ragged {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// Fields in this row.
-        found: usize,
-        /// Fields in the header.
-        expected: usize,
-    },
-    /// A field is not a number.
-    #[error(
-        "{}, line {line} (row {row}), column `{column}`: `{value}` is not a number; write it like 0.25, or remove this row", file.display()
-    )]
-    NotNumeric {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The field as written.
-        value: String,
-    },
-    /// A field is NaN, infinite, or too large for a 32-bit number.
-    #[error(
-        "{}, line {line} (row {row}), column `{column}`: {value} is not a finite value; remove this row or fill the gap", file.display()
-    )]
-    NotFinite {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The field as written.
-        value: String,
-    },
-    /// An angle beyond ±2π: most likely the file is in degrees.
-    #[error(
-        "{}, line {line} (row {row}), column `{column}`: {value} is beyond ±2π; angles are in radians: multiply degrees by 0.0174533", file.display()
-    )]
-    NotRadians {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The value.
-        value: f32,
-    },
-    /// Times do not grow.
-    #[error(
-        "{}, line {line} (row {row}), column `time_s`: {time_s} does not come after {before}; sort the rows by time and remove doubles", file.display()
-    )]
-    TimeNotIncreasing {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The time of this row.
-        time_s: f64,
-        /// The time of the row before.
-        before: f64,
-    },
-    /// Fewer rows than the work at hand needs.
-    #[error(
-        "{}: {found} rows, at least {needed} are needed; record more samples", file.display()
-    )]
-    TooFewRows {
-        /// The file.
-        file: PathBuf,
-        /// Rows found.
-        found: usize,
-        /// Rows needed.
-        needed: usize,
-    },
-}
-
-/// A header as a person reads it in an error: the first names and how many more.
-struct Named<'a>(&'a [String]);
-
-impl core::fmt::Display for Named<'_> {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        const SHOWN: usize = 6;
-        write!(f, "the header has {} columns: ", self.0.len())?;
-        write!(f, "{}", self.0[..self.0.len().min(SHOWN)].join(", "))?;
-        if self.0.len() > SHOWN {
-            write!(f, ", …")?;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod matrix_tests;
+#[cfg(test)]
+mod people_tests;
 #[cfg(test)]
 mod tests;

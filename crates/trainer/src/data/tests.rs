@@ -95,12 +95,13 @@ fn an_empty_file_and_one_without_rows_are_different_faults() {
 fn times_that_stand_still_or_go_back_are_refused() {
     for second in ["0.5", "0.4"] {
         let said = fault(&format!(
-            "time_s,index_mcp_flex,index_pip_flex\n0.5,1,2\n{second},1,2\n"
+            "time_s,index_mcp_flex,index_pip_flex\n0.5,1,2\n{second},1,2.5\n"
         ));
         assert!(
             said.contains("line 3 (row 2), column `time_s`") && said.contains("0.5"),
             "{said}"
         );
+        assert!(!said.contains("sort"), "{said}");
     }
 }
 

@@ -1,92 +1,14 @@
 //! The model file: safetensors, all F32, the tensors that every reader expects by name. Written whole or not at all, and byte for
 //! byte the same for the same model.
 
-use super::{Metadata, Model, Normalisation};
+use super::{Error, Metadata, Model, Normalisation};
 use crate::network::Network;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
-use std::path::{Path, PathBuf};
-
-/// What can be wrong with a model file.
-#[derive(Debug, thiserror::Error)]
-pub enum Error {
-    /// The file cannot be opened or read.
-    #[error("cannot read {}: {source}; check the path and that you may read it", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file cannot be written.
-    #[error("cannot write {}: {source}; check that the folder exists and that you may write there", file.display())]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The bytes are no safetensors file.
-    #[error("{} is not a safetensors file ({what}); give a model that `gauntlet train --out` wrote", file.display())]
-    NotSafetensors {
-        /// The file.
-        file: PathBuf,
-        /// What the format's reader said.
-        what: String,
-    },
-    /// A tensor is not there.
-    #[error("{}: tensor `{tensor}` is missing; give a model that `gauntlet train --out` wrote", file.display())]
-    MissingTensor {
-        /// The file.
-        file: PathBuf,
-        /// The tensor.
-        tensor: String,
-    },
-    /// A tensor has another shape than the rest asks for.
-    #[error("{}: tensor `{tensor}` has shape {found:?}, expected {expected}; the file is damaged or of another program: train again", file.display())]
-    TensorShape {
-        /// The file.
-        file: PathBuf,
-        /// The tensor.
-        tensor: String,
-        /// Its shape.
-        found: Vec<usize>,
-        /// The shape it should have, in words.
-        expected: String,
-    },
-    /// A tensor's numbers are not F32.
-    #[error("{}: tensor `{tensor}` holds {found} numbers, expected F32; convert it or train again", file.display())]
-    NotF32 {
-        /// The file.
-        file: PathBuf,
-        /// The tensor.
-        tensor: String,
-        /// The type of its numbers.
-        found: String,
-    },
-    /// A number is NaN or infinite, or a scale is 0.
-    #[error("{}: tensor `{tensor}`, element {element} is {value}, which no model can use; train again", file.display())]
-    BadValue {
-        /// The file.
-        file: PathBuf,
-        /// The tensor.
-        tensor: String,
-        /// Which element, from 0.
-        element: usize,
-        /// Its value.
-        value: f32,
-    },
-    /// A sound model, but for other domains.
-    #[error("{}: this model maps {} values to {}, here {} to {} are needed; train one on data of this shape", file.display(), found[0], found[1], expected[0], expected[1])]
-    ModelShape {
-        /// The file.
-        file: PathBuf,
-        /// Inputs and outputs of the model.
-        found: [usize; 2],
-        /// Inputs and outputs needed.
-        expected: [usize; 2],
-    },
-}
+use sha2::{Digest, Sha256};
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
 
 impl Model {
     /// Reads a model file.
@@ -95,11 +17,7 @@ impl Model {
     /// Any of [`Error`] but the last.
     pub fn load(path: impl AsRef<Path>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let bytes = std::fs::read(path).map_err(|source| Error::Read {
-            file: path.to_owned(),
-            source,
-        })?;
-        Self::from_bytes(&bytes, path)
+        Self::from_bytes(&read(path)?, path)
     }
 
     /// Reads a model file and refuses one that does not map `inputs` values to `outputs`.
@@ -109,15 +27,24 @@ impl Model {
     pub fn load_for(path: impl AsRef<Path>, inputs: usize, outputs: usize) -> Result<Self, Error> {
         let path = path.as_ref();
         let model = Self::load(path)?;
-        let found = [model.f.inputs, model.f.outputs];
-        if found != [inputs, outputs] {
-            return Err(Error::ModelShape {
-                file: path.to_owned(),
-                found,
-                expected: [inputs, outputs],
-            });
-        }
+        model.require_shape(path, inputs, outputs)?;
         Ok(model)
+    }
+
+    /// Refuses a model, which was read from `file`, that does not map `inputs` values to `outputs`.
+    ///
+    /// # Errors
+    /// [`Error::ModelShape`].
+    pub fn require_shape(&self, file: &Path, inputs: usize, outputs: usize) -> Result<(), Error> {
+        let (found, expected) = ([self.f.inputs, self.f.outputs], [inputs, outputs]);
+        if found == expected {
+            return Ok(());
+        }
+        Err(Error::ModelShape {
+            file: file.to_owned(),
+            found,
+            expected,
+        })
     }
 
     /// A model from the bytes of its file; `name` stands for the file in errors.
@@ -128,13 +55,16 @@ impl Model {
         let tensors = Tensors::parse(bytes, name)?;
         let [hidden, inputs] = tensors.matrix_shape("f.w1")?;
         let [outputs, _] = tensors.matrix_shape("f.w2")?;
-        Ok(Self {
+        let mut model = Self {
             f: tensors.network("f", [inputs, hidden, outputs])?,
             g: tensors.network("g", [outputs, hidden, inputs])?,
             q: tensors.normalisation("q", inputs)?,
             x: tensors.normalisation("x", outputs)?,
             metadata: tensors.metadata,
-        })
+        };
+        // After the rest, whose errors name the place.
+        model.take_digests(name)?;
+        Ok(model)
     }
 
     /// Writes the model file; whoever looks sees the old file or the new one, never a half.
@@ -157,9 +87,7 @@ impl Model {
     #[must_use]
     pub fn to_bytes(&self) -> Vec<u8> {
         let mut header = Map::new();
-        if !self.metadata.is_empty() {
-            header.insert("__metadata__".to_owned(), json!(self.metadata));
-        }
+        header.insert("__metadata__".to_owned(), json!(self.with_digests()));
         let mut data: Vec<u8> = Vec::new();
         for (name, shape, values) in self.tensors() {
             let start = data.len();
@@ -176,6 +104,49 @@ impl Model {
         bytes.extend_from_slice(text.as_bytes());
         bytes.extend_from_slice(&data);
         bytes
+    }
+
+    /// The digest of the tensors that the model's file carries as `weights_sha256`: SHA-256, in lower-case hexadecimal, over every
+    /// tensor in the order of [`Model::to_bytes`]: its name, a zero byte, the number of its dimensions and each of them (64 bits,
+    /// little-endian), its values (little-endian).
+    #[must_use]
+    pub fn weights_sha256(&self) -> String {
+        let mut hash = Sha256::new();
+        for (name, shape, values) in self.tensors() {
+            let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
+            digest_tensor(&mut hash, &name, &shape, &bytes);
+        }
+        hexadecimal(hash)
+    }
+
+    /// Compares the digests in the metadata with what is there, and takes them out. A file of an earlier version has none; where the
+    /// one is there and the other not, a key was damaged, unless the digest of the metadata says that nothing else is there.
+    fn take_digests(&mut self, file: &Path) -> Result<(), Error> {
+        let about = metadata_sha256(&self.metadata);
+        let weights = self.metadata.remove(WEIGHTS);
+        let words = self.metadata.remove(METADATA);
+        let damaged = |what| {
+            Err(Error::Damaged {
+                file: file.to_owned(),
+                what,
+            })
+        };
+        match (weights, words) {
+            (_, Some(words)) if words != about => damaged("what is said about the training"),
+            (Some(_), None) => damaged("what is said about the training"),
+            (Some(weights), _) if weights != self.weights_sha256() => damaged("a weight"),
+            _ => Ok(()),
+        }
+    }
+
+    /// The metadata with the digests of the tensors and of itself.
+    fn with_digests(&self) -> Metadata {
+        let mut metadata = self.metadata.clone();
+        metadata.retain(|key, _| key != WEIGHTS && key != METADATA);
+        let digest = metadata_sha256(&metadata);
+        metadata.insert(WEIGHTS.to_owned(), self.weights_sha256());
+        metadata.insert(METADATA.to_owned(), digest);
+        metadata
     }
 
     /// Every tensor: name, shape, values.
@@ -200,6 +171,74 @@ impl Model {
         }
         list
     }
+}
+
+/// No model is longer, nor what comes through a pipe, which may have no end.
+const LONGEST_FILE: u64 = 2 << 30;
+const LONGEST: u64 = 64 << 20;
+/// The keys of the digests.
+const WEIGHTS: &str = "weights_sha256";
+const METADATA: &str = "metadata_sha256";
+
+/// Whether a model file carries a digest of its tensors; those of earlier versions do not. `false` for what is no model file.
+#[must_use]
+pub fn has_digest(bytes: &[u8]) -> bool {
+    let header = SafeTensors::read_metadata(bytes).ok();
+    let words = header.and_then(|(_, header)| header.metadata().clone());
+    words.is_some_and(|words| words.contains_key(WEIGHTS))
+}
+
+/// The bytes of a model's file, of a pipe no more than a model has.
+///
+/// # Errors
+/// [`Error::Read`].
+pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
+    let path = path.as_ref();
+    let mut bytes = Vec::new();
+    let read = File::open(path).and_then(|file| {
+        let is_file = file.metadata()?.is_file();
+        let most = if is_file { LONGEST_FILE } else { LONGEST };
+        file.take(most).read_to_end(&mut bytes)
+    });
+    match read {
+        Ok(_) => Ok(bytes),
+        Err(source) => Err(Error::Read {
+            file: path.to_owned(),
+            source,
+        }),
+    }
+}
+
+fn digest_tensor(hash: &mut Sha256, name: &str, shape: &[usize], bytes: &[u8]) {
+    hash.update(name.as_bytes());
+    hash.update([0]);
+    hash.update((shape.len() as u64).to_le_bytes());
+    for length in shape {
+        hash.update((*length as u64).to_le_bytes());
+    }
+    hash.update(bytes);
+}
+
+/// Over all keys but the digests' own, in their order: key, zero byte, text, zero byte.
+fn metadata_sha256(metadata: &Metadata) -> String {
+    let mut hash = Sha256::new();
+    for (key, text) in metadata
+        .iter()
+        .filter(|(k, _)| *k != WEIGHTS && *k != METADATA)
+    {
+        for word in [key, text] {
+            hash.update(word.as_bytes());
+            hash.update([0]);
+        }
+    }
+    hexadecimal(hash)
+}
+
+fn hexadecimal(hash: Sha256) -> String {
+    hash.finalize()
+        .iter()
+        .map(|byte| format!("{byte:02x}"))
+        .collect()
 }
 
 /// The tensors of a model file.

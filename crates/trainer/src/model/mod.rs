@@ -1,9 +1,11 @@
 //! A trained model: the networks f and g, the normalisation of both domains, and what is known about the training. Its file
 //! (safetensors) and the weights image for the bridge.
 
+mod error;
 mod file;
 
-pub use file::Error;
+pub use error::Error;
+pub use file::{has_digest, read};
 
 use crate::network::Network;
 use std::collections::BTreeMap;
@@ -97,8 +99,9 @@ impl Normalisation {
 pub type Metadata = BTreeMap<String, String>;
 
 /// The keys that a model file may carry: the cost's name, α, λ1 λ2 λ3 (separated by spaces), number of pairs, seed, epochs, digest of
-/// the data, and the four measures on held-out samples (an unknown measure is left out).
-pub const METADATA_KEYS: [&str; 11] = [
+/// the data, digests of the tensors and of everything else that is said here, and the four measures on held-out samples (an unknown
+/// measure is left out). The two digests are made when the file is written, compared when it is read, and not in [`Model::metadata`].
+pub const METADATA_KEYS: [&str; 13] = [
     "cost",
     "alpha",
     "lambda",
@@ -106,6 +109,8 @@ pub const METADATA_KEYS: [&str; 11] = [
     "seed",
     "epochs",
     "data_sha256",
+    "weights_sha256",
+    "metadata_sha256",
     "dbar",
     "vo",
     "dknn",

@@ -194,6 +194,30 @@ fn a_model_of_other_domains_is_refused_with_both_shapes() {
 }
 
 #[test]
+fn no_flipped_bit_of_a_model_file_is_taken() {
+    let mut bytes = model(3, 5, 2).to_bytes();
+    for bit in 0..8 * bytes.len() {
+        bytes[bit / 8] ^= 1 << (bit % 8);
+        let taken = Model::from_bytes(&bytes, Path::new("m.safetensors"));
+        assert!(taken.is_err(), "bit {} of byte {}", bit % 8, bit / 8);
+        bytes[bit / 8] ^= 1 << (bit % 8);
+    }
+    assert!(Model::from_bytes(&bytes, Path::new("m")).is_ok() && has_digest(&bytes));
+}
+
+#[test]
+fn a_model_of_an_earlier_version_has_no_digest_and_is_taken() {
+    let model = model(3, 5, 2);
+    let bytes = model.to_bytes();
+    let read = safetensors::SafeTensors::deserialize(&bytes).unwrap();
+    let metadata = model.metadata.clone().into_iter().collect();
+    let earlier = safetensors::serialize(read.tensors(), Some(metadata)).unwrap();
+    assert_eq!(Model::from_bytes(&earlier, Path::new("m")).unwrap(), model);
+    assert!(!has_digest(&earlier));
+    assert!(!has_digest(b"no model"));
+}
+
+#[test]
 fn the_weights_image_gives_the_counts_of_the_map() {
     #[repr(align(64))]
     struct Aligned([u8; 40_000]);

@@ -163,7 +163,12 @@ impl Laboratory {
             seconds += start.elapsed().as_secs_f64();
             let done = match step {
                 Ok(()) => true,
-                Err(algorithm::Error::Stopped { epoch }) if Some(epoch) == pause => false,
+                // A stop that was asked for at that very epoch is one.
+                Err(algorithm::Error::Stopped { epoch })
+                    if Some(epoch) == pause && !watch.stop() =>
+                {
+                    false
+                }
                 Err(error) => return Err(fail(error)),
             };
             if cell.trace_every > 0 {
@@ -206,7 +211,7 @@ impl Laboratory {
     pub fn stages(&self, cell: &Cell, watch: &dyn Watch) -> Result<Vec<Stage>, Error> {
         let mut prepared = self.prepare(cell)?;
         let each = cell.plan().stage_epochs.max(1);
-        prepared.settings.report_every = each;
+        prepared.settings.report_every = often(each);
         let fail = |source| failure(cell, source);
         let mut trainer =
             Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
@@ -215,7 +220,8 @@ impl Laboratory {
             let pause = (stage < cell.pairs).then_some((stage + 1) * each);
             match train_until((&mut trainer, cell), &mut prepared, pause, watch) {
                 Ok(()) => {}
-                Err(algorithm::Error::Stopped { epoch }) if Some(epoch) == pause => {}
+                Err(algorithm::Error::Stopped { epoch })
+                    if Some(epoch) == pause && !watch.stop() => {}
                 Err(error) => return Err(fail(error)),
             }
             stages.push((trainer.networks().f, trainer.pairs().clone()));
@@ -232,6 +238,16 @@ fn failure(cell: &Cell, source: algorithm::Error) -> Error {
             source,
         },
     }
+}
+
+/// Epochs between two looks at the clock, of which each `pause` epochs are one: few, so that a stop is heard within a second or two
+/// whatever the machine.
+fn often(pause: usize) -> usize {
+    const MOST: usize = 10;
+    (1..=MOST)
+        .rev()
+        .find(|each| pause.is_multiple_of(*each))
+        .unwrap_or(1)
 }
 
 /// The next epoch at which to measure on the way.
@@ -317,11 +333,7 @@ fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
         initialisation: cell.initialisation,
         // Cells run side by side: one thread each.
         threads: 1,
-        report_every: if cell.trace_every > 0 {
-            cell.trace_every
-        } else {
-            50
-        },
+        report_every: often(cell.trace_every),
         ..Settings::shapes(plan, cell.seed)
     }
 }

@@ -100,6 +100,20 @@ fn stopping_keeps_what_is_done_and_damaged_files_count_as_not_done() {
     assert_eq!(store.find(&cell), None);
 }
 
+/// Curves pause a training to measure: a stop that is asked for there is not taken for such a pause.
+#[test]
+fn a_stop_at_a_point_of_a_curve_or_at_the_end_of_a_stage_is_a_stop() {
+    let laboratory = laboratory();
+    let traced = Cell {
+        trace_every: 4,
+        ..cell(Source::Generated, Row::HaeAdaptive)
+    };
+    let stopped = laboratory.run(&traced, &|| true);
+    assert!(matches!(stopped, Err(Error::Stopped)));
+    let stopped = laboratory.stages(&traced, &|| true);
+    assert!(matches!(stopped, Err(Error::Stopped)));
+}
+
 #[test]
 fn what_is_not_there_is_said() {
     let laboratory = laboratory();

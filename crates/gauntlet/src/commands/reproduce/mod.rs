@@ -94,21 +94,14 @@ impl Reproduce {
         if self.quick {
             return algorithm::Schedule::Custom(QUICK);
         }
-        let schedule = algorithm::Schedule::from(self.schedule);
-        match self.epochs {
-            Some(epochs) => {
-                // Of two dimensions: most of the trainings are on shapes.
-                let plan = schedule.plan_for(2).with_last_epochs(epochs as usize);
-                algorithm::Schedule::Custom(plan)
-            }
-            None => schedule,
-        }
+        algorithm::Schedule::from(self.schedule)
     }
 
     fn frame(&self) -> Frame {
         Frame {
             seeds: self.seeds.unwrap_or(if self.quick { 1 } else { 10 }),
             schedule: self.schedule(),
+            epochs: self.epochs.map(|epochs| epochs as usize),
             initialisation: match self.normal {
                 Some(deviation) => Initialisation::Normal(deviation),
                 None => Initialisation::Glorot,

@@ -75,6 +75,8 @@ pub struct Frame {
     pub seeds: u64,
     /// How long each training is.
     pub schedule: Schedule,
+    /// Epochs of the last stage, instead of the schedule's.
+    pub epochs: Option<usize>,
     /// How the weights start.
     pub initialisation: Initialisation,
     /// Generated motion, or the recording.
@@ -88,22 +90,20 @@ impl Frame {
     /// Whether the known ranges are meant for such a run: the paper's schedule and start, five repetitions or more.
     pub fn is_full(&self) -> bool {
         matches!(
-            (self.schedule, self.initialisation),
-            (Schedule::Paper, Initialisation::Glorot)
+            (self.schedule, self.epochs, self.initialisation),
+            (Schedule::Paper, None, Initialisation::Glorot)
         ) && self.seeds >= 5
     }
 
     /// For below a drawing: how many trainings a number is the mean of, and how long they were.
     pub fn describe(&self) -> String {
+        let others =
+            |epochs| format!("{epochs} epochs in the last session, not the paper's number");
         let schedule = match self.schedule {
+            _ if self.epochs.is_some() => others(self.epochs.unwrap_or_default()),
             Schedule::Paper => "the paper's schedule".to_owned(),
             Schedule::Fast => "the fast schedule".to_owned(),
-            Schedule::Custom(plan) => {
-                format!(
-                    "{} epochs in the last session, not the paper's number",
-                    plan.last_epochs
-                )
-            }
+            Schedule::Custom(plan) => others(plan.last_epochs),
         };
         match self.seeds {
             1 => format!("one repetition; {schedule}"),
@@ -133,6 +133,14 @@ impl Frame {
             schedule: self.schedule,
             initialisation: self.initialisation,
             ..Cell::of_table(source, row, seed)
+        };
+        // By the plan of this very cell: a hand's is another than a plane's.
+        let cell = match self.epochs {
+            Some(epochs) => Cell {
+                schedule: Schedule::Custom(cell.plan().with_last_epochs(epochs)),
+                ..cell
+            },
+            None => cell,
         };
         // Measured on the way, so that one training serves the table and the curves.
         let every = (cell.epochs() / CURVE_POINTS).max(1);
@@ -234,9 +242,24 @@ mod tests {
         Frame {
             seeds: 10,
             schedule: Schedule::Paper,
+            epochs: None,
             initialisation: Initialisation::Glorot,
             hand: Source::Generated,
         }
+    }
+
+    #[test]
+    fn other_epochs_keep_the_plan_of_each_domain() {
+        let frame = Frame {
+            schedule: Schedule::Fast,
+            epochs: Some(500),
+            ..frame()
+        };
+        for (what, dimensions) in [(What::Table2, 2), (What::Table4, 4)] {
+            let wanted = Schedule::Fast.plan_for(dimensions).with_last_epochs(500);
+            assert_eq!(frame.cells(what)[0].plan(), wanted, "{what:?}");
+        }
+        assert!(frame.describe().contains("500 epochs") && !frame.is_full());
     }
 
     #[test]

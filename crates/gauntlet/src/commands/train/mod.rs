@@ -2,10 +2,13 @@
 
 mod args;
 
-use std::path::Path;
+use std::fs::OpenOptions;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use serde_json::{Value, json};
+use trainer::model::Model;
 use trainer::network::Initialisation;
 use trainer::table3::POSES;
 
@@ -57,32 +60,39 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
         Ended::Trained(learned) => learned,
         Ended::StoppedAt(epoch) => return stopped(options, epoch, &tell),
     };
-    let (model, measured) = task.model(&course, &learned, interrupt)?;
+    let mut model = task.model(&course, &learned);
+    save(&model, options)?;
+    let measured = task
+        .measure(&mut model, interrupt)
+        .map_err(|_| unmeasured(options))?;
+    // The whole file with its measures; the one without is there whatever becomes of it.
     model.save(&options.out).map_err(told)?;
-    if let Some(warning) = far_from_truth(&measured) {
+    let is_hand = options.poses.is_some();
+    let quality = Quality::from_measured(&measured);
+    let unfit = if is_hand { unfit(&quality) } else { None };
+    for warning in far_from_truth(&measured).into_iter().chain(unfit) {
         out::note(format_args!("warning: {warning}"));
         learned.warnings.push(warning);
     }
-    let is_hand = options.poses.is_some();
     if options.json {
-        let quality = if is_hand {
-            json!(Quality::from_measured(&measured))
-        } else {
-            json!(measured)
-        };
-        return out::json(&json!({
+        let mut result = json!({
             "model": options.out,
             "epochs": learned.trained.epochs,
             "pairs": learned.trained.pairs.inputs.rows,
             "seed": options.seed,
             "training_s": learned.took.as_secs_f64(),
             "warnings": learned.warnings,
-            "quality": quality,
-        }));
+            "quality": measured,
+        });
+        if is_hand {
+            result["quality"] = json!(quality);
+            result["good"] = json!(quality.good());
+        }
+        return out::json(&result);
     }
     tell.say(format_args!("trained    in {}", seconds(learned.took)));
     let lines = if is_hand {
-        vec![Quality::from_measured(&measured).line()]
+        vec![quality.line()]
     } else {
         measured.lines()
     };
@@ -91,6 +101,60 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     }
     tell.say(format_args!("model      {}", options.out.display()));
     Ok(())
+}
+
+/// Saves a finished training before anything else is computed. Where the place that was tried before takes it no more, it goes where
+/// passing files go.
+fn save(model: &Model, options: &Train) -> Result<()> {
+    let Err(error) = model.save(&options.out) else {
+        return Ok(());
+    };
+    let error = error.to_string();
+    let what = error.rsplit_once("; ").map_or(&error[..], |(what, _)| what);
+    let name = format!("gauntlet-{}.safetensors", std::process::id());
+    let other = std::env::temp_dir().join(name);
+    let written = OpenOptions::new()
+        .write(true)
+        .create_new(true)
+        .open(&other)
+        .and_then(|mut file| file.write_all(&model.to_bytes()));
+    Err(match written {
+        Ok(()) => Failure::new(
+            format!("{what}; the finished model is in {}", other.display()),
+            format!("mv '{}' '{}'", other.display(), options.out.display()),
+        ),
+        Err(_) => Failure::new(what, "a folder with room that you may write in"),
+    }
+    .into())
+}
+
+/// The end was asked for while the map was measured: the model is there.
+fn unmeasured(options: &Train) -> anyhow::Error {
+    let out = options.out.display();
+    let what = format!(
+        "interrupted while the map was measured: the model is whole in {out}, without its measures"
+    );
+    let next = match (&options.poses, &options.input, &options.target) {
+        (None, Some(input), Some(target)) => format!(
+            "gauntlet eval --model {out} --input {} --target {}",
+            input.display(),
+            target.display()
+        ),
+        (poses, ..) => format!(
+            "gauntlet eval --model {out} --poses {}",
+            poses.as_deref().unwrap_or(Path::new("FILE.csv")).display()
+        ),
+    };
+    Failure::new(what, next).into()
+}
+
+/// Why a hand's map is not worth driving with, and what helps.
+fn unfit(quality: &Quality) -> Option<String> {
+    let fault = quality.fault()?;
+    Some(format!(
+        "{fault}; train longer (--schedule, --epochs), with another --seed, or on a recording in which every finger moves over its \
+         whole range, alone and together"
+    ))
 }
 
 /// What true pairs say of a map that neighbours alone may not show to be folded: right maps have an NMSE below about .1, folded or
@@ -106,24 +170,28 @@ fn far_from_truth(measured: &Measured) -> Option<String> {
 
 /// Before minutes of training, not after.
 fn check_outputs(options: &Train) -> Result<()> {
-    let inputs: Vec<&Path> = [
+    let inputs = [
         &options.poses,
         &options.input,
         &options.target,
         &options.truth,
         &options.pairs_file,
-    ]
-    .into_iter()
-    .flatten()
-    .map(std::path::PathBuf::as_path)
-    .collect();
-    outputs::check(&options.out, Kind::Model, &inputs)?;
-    if let Some(path) = &options.checkpoint {
-        let mut inputs = inputs;
-        inputs.push(&options.out);
-        outputs::check(path, Kind::Model, &inputs)?;
+    ];
+    let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
+    // Read and written: the state goes on in the file it is taken from.
+    let resume = options.resume.as_deref();
+    let all: Vec<&Path> = inputs.iter().copied().chain(resume).collect();
+    outputs::check(&options.out, Kind::Model, &all)?;
+    match (options.checkpoint.as_deref(), resume) {
+        (Some(path), _) => {
+            let mut inputs = inputs;
+            inputs.push(&options.out);
+            outputs::check(path, Kind::Checkpoint, &inputs)
+        }
+        // Whether it is a checkpoint is seen when it is read.
+        (None, Some(path)) if path.is_file() => outputs::room(path),
+        (None, _) => Ok(()),
     }
-    Ok(())
 }
 
 fn hand_pairs(options: &Train) -> hand::HandPairs<'_> {

@@ -2,7 +2,7 @@
 
 use super::cloud::UnitPart;
 use super::cloud::{Cloud, PairPart, QPart, Sums, Ways, XPart};
-use super::{Engine, Parts, Weights};
+use super::{Engine, Parts, Weights, nets};
 use crate::kernel::affine::backward::{Flow, Total, backward, by_samples, gradient};
 use crate::kernel::affine::forward::{Images, forward};
 use crate::kernel::affine::{Net, Trace};
@@ -122,19 +122,15 @@ impl Engine {
         batch: usize,
         work: fn(&Shared<'_>, &mut Piece<'_>),
     ) {
-        let (flat_f, flat_g) = self.parameters.split_at(self.f.len());
+        let [f, g] = nets(
+            [self.f, self.g],
+            &self.parameters,
+            [&self.copies_f, &self.copies_g],
+        );
         let shared = Shared {
             machine: self.machine,
-            f: Net {
-                shape: self.f,
-                flat: flat_f,
-                copies: &self.copies_f,
-            },
-            g: Net {
-                shape: self.g,
-                flat: flat_g,
-                copies: &self.copies_g,
-            },
+            f,
+            g,
             q: &self.q,
             x: &self.batches[batch],
             weights,
@@ -206,7 +202,11 @@ impl Engine {
     fn reduce(&mut self, weights: &Weights) {
         let mut parts = core::mem::take(&mut self.unit_parts);
         let mut sum = core::mem::take(&mut self.gradient);
-        let [f, g] = self.nets();
+        let [f, g] = nets(
+            [self.f, self.g],
+            &self.parameters,
+            [&self.copies_f, &self.copies_g],
+        );
         let count = self.q.blocks.count as f64;
         let q_f: Vec<&[f32]> = self.q_parts.iter().map(|p| &p.of_f.sums[..]).collect();
         let distorts = weights.distortion != 0.0;

@@ -1,0 +1,260 @@
+//! What can be wrong with a file of samples.
+
+use std::path::PathBuf;
+
+/// What can be wrong with a file of samples. Rows are counted from 1 without the header; the line of the file comes with them.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// The file cannot be opened or read.
+    #[error(
+        "cannot read {}: {source}; check the path and that you may read it", file.display()
+    )]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The file cannot be written.
+    #[error(
+        "cannot write {}: {source}; check that the folder exists and that you may write there", file.display()
+    )]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not text, or the quotes do not close.
+    #[error(
+        "{}, line {line}: not CSV text ({what}); save it as comma-separated UTF-8 text with one header line", file.display()
+    )]
+    NotCsv {
+        /// The file.
+        file: PathBuf,
+        /// Line of the fault, from 1.
+        line: u64,
+        /// What the reader said.
+        what: String,
+    },
+    /// Another encoding than UTF-8, or no text.
+    #[error("{} is {what}, not UTF-8 text; {next}", file.display())]
+    Encoding {
+        /// The file.
+        file: PathBuf,
+        /// What it seems to be.
+        what: String,
+        /// What makes it readable.
+        next: String,
+    },
+    /// Numbers where the header should be.
+    #[error(
+        "{}, line {line}: {fields} fields, numbers: the header is missing; put a line with the columns' names above", file.display()
+    )]
+    NoHeader {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Fields on that line.
+        fields: usize,
+    },
+    /// Commas between the fields and within the numbers.
+    #[error(
+        "{}, line {line} (row {row}): {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields; save it with semicolons between the fields, or with decimal points", file.display()
+    )]
+    BothCommas {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// Fields in this row.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// A decimal point in a file with decimal commas.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: `{value}` has a point, others have decimal commas; save the file with one of them, without marks between thousands", file.display()
+    )]
+    TwoMarks {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The field as written.
+        value: String,
+    },
+    /// No header line.
+    #[error(
+        "{} is empty; it needs a header line that names the columns, then one line a sample", file.display()
+    )]
+    Empty {
+        /// The file.
+        file: PathBuf,
+    },
+    /// A column that is needed is not in the header.
+    #[error(
+        "{}: column `{column}` is missing ({}); add it to the header line and to every row", file.display(), Named(found)
+    )]
+    MissingColumn {
+        /// The file.
+        file: PathBuf,
+        /// The missing column.
+        column: String,
+        /// The header as it stands.
+        found: Vec<String>,
+    },
+    /// A column is in the header twice.
+    #[error(
+        "{}: column `{column}` is in the header twice; remove or rename one of them", file.display()
+    )]
+    DuplicateColumn {
+        /// The file.
+        file: PathBuf,
+        /// The column.
+        column: String,
+    },
+    /// A row has more or fewer fields than the header.
+    #[error(
+        "{}, line {line} (row {row}): {found} fields, the header has {expected}; complete or remove this row", file.display()
+    )]
+    Ragged {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// Fields in this row.
+        found: usize,
+        /// Fields in the header.
+        expected: usize,
+    },
+    /// A field is not a number.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: `{value}` is not a number; write it like 0.25, or remove this row", file.display()
+    )]
+    NotNumeric {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The field as written.
+        value: String,
+    },
+    /// A field is NaN, infinite, or too large for a 32-bit number.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: {value} is not a finite value; remove this row or fill the gap", file.display()
+    )]
+    NotFinite {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The field as written.
+        value: String,
+    },
+    /// An angle beyond a full turn.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: {value} is beyond {}", file.display(),
+        if *degrees { "±360°; repair or remove this row" } else { "±2π; angles are in radians: multiply degrees by 0.0174533, or name their unit in the header (`index_mcp_flex [deg]`)" }
+    )]
+    BeyondTurn {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The value as written.
+        value: f32,
+        /// Whether the file is in degrees.
+        degrees: bool,
+    },
+    /// A unit that no angle has.
+    #[error(
+        "{}: column `{column}` is in `{unit}`, which is no unit of angles; give radians ([rad]) or degrees ([deg])", file.display()
+    )]
+    Unit {
+        /// The file.
+        file: PathBuf,
+        /// The column as written.
+        column: String,
+        /// The unit as written.
+        unit: String,
+    },
+    /// Angles of two units.
+    #[error(
+        "{}: column `{column}` is not said to be in {others}, as others are; write one unit for all angles", file.display()
+    )]
+    MixedUnits {
+        /// The file.
+        file: PathBuf,
+        /// The column as written.
+        column: String,
+        /// The unit of the others.
+        others: &'static str,
+    },
+    /// Times do not grow.
+    #[error(
+        "{}, line {line} (row {row}), column `{column}`: {time_s} does not come after {before}; a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order", file.display()
+    )]
+    TimeNotIncreasing {
+        /// The file.
+        file: PathBuf,
+        /// Line in the file, from 1.
+        line: u64,
+        /// Row, from 1.
+        row: usize,
+        /// The column.
+        column: String,
+        /// The time of this row, as written.
+        time_s: f64,
+        /// The time of the row before.
+        before: f64,
+    },
+    /// Fewer rows than the work at hand needs.
+    #[error(
+        "{}: {found} rows, at least {needed} are needed; record more samples", file.display()
+    )]
+    TooFewRows {
+        /// The file.
+        file: PathBuf,
+        /// Rows found.
+        found: usize,
+        /// Rows needed.
+        needed: usize,
+    },
+}
+
+/// A header as a person reads it in an error: the first names and how many more.
+struct Named<'a>(&'a [String]);
+
+impl core::fmt::Display for Named<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        const SHOWN: usize = 6;
+        write!(f, "the header has {} columns: ", self.0.len())?;
+        write!(f, "{}", self.0[..self.0.len().min(SHOWN)].join(", "))?;
+        if self.0.len() > SHOWN {
+            write!(f, ", …")?;
+        }
+        Ok(())
+    }
+}
