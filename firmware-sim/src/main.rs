@@ -9,6 +9,7 @@ mod board;
 
 use board::{Board, Port, PsramSlot, StackWatch, SystemTime, Watchdog, wait_for_interrupt};
 use bridge::gripper::driver::ThreeFinger;
+use bridge::protocol::message::Restart;
 use bridge::protocol::{self, Outcome, Server};
 use bridge::{App, Config, Instant, Platform, WeightsStore, glove, gripper};
 
@@ -40,7 +41,7 @@ fn main() -> ! {
         run(board);
     }
     // Unreachable on a whole machine: the board is taken once. A reset is the only thing left to try.
-    cortex_m::peripheral::SCB::sys_reset()
+    board::restart()
 }
 
 fn run(board: Board) {
@@ -52,6 +53,7 @@ fn run(board: Board) {
         slots,
         mut watchdog,
         mut stack,
+        started,
     } = board;
     let store = WeightsStore::new(slots, bridge::app::expected(AXES));
     let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
@@ -63,8 +65,8 @@ fn run(board: Board) {
     let mut app: Bridge = App::new(Machine { time }, scanner, gripper, store, Config::default());
     let mut server = Server::new(host);
     watchdog.start();
-    while turn(&mut app, &mut server, &mut watchdog, &mut stack) == Outcome::Continue {}
-    cortex_m::peripheral::SCB::sys_reset()
+    while turn(&mut app, &mut server, &mut watchdog, &mut stack, started) == Outcome::Continue {}
+    board::restart()
 }
 
 /// One turn of the loop: the bridge, the host, then sleep until something is due.
@@ -76,12 +78,14 @@ fn turn(
     server: &mut Server<Port>,
     watchdog: &mut Watchdog,
     stack: &mut StackWatch,
+    started: Restart,
 ) -> Outcome {
     let due = app.step();
     let outcome = server.poll(app.telemetry().now, app);
     server.tell_board(protocol::Board {
         bytes_lost: board::bytes_lost(),
         stack_used: stack.look(),
+        restart: started,
     });
     watchdog.feed();
     app.platform_mut().wait_until(due);
@@ -91,5 +95,5 @@ fn turn(
 /// Nothing in the loop panics (a check on the linked program shows it); start-up may.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
+    board::restart()
 }

@@ -223,6 +223,27 @@ impl VirtualGripper {
         }
     }
 
+    /// Lets the status say that axis `index` is `counts` from where it truly is.
+    pub fn set_shown_offset(&self, index: usize, counts: i16) {
+        let mut server = self.server();
+        if let Some(offset) = server.lies.position.get_mut(index) {
+            *offset = counts.clamp(-255, 255);
+        }
+        server.show_status();
+    }
+
+    /// Lets every echo read this, whatever was written; or be true again.
+    pub fn set_shown_echo(&self, echo: Option<u8>) {
+        let mut server = self.server();
+        server.lies.echo = echo;
+        server.show_status();
+    }
+
+    /// Stops the motor of axis `index` for good, or lets it turn again; its contact stays as it was.
+    pub fn set_dead(&self, index: usize, dead: bool) {
+        self.with_axis(index, |a| a.dead = dead);
+    }
+
     /// Swallows the answers to the next `count` requests (they are carried out); `u32::MAX` for ever.
     pub fn mute(&self, count: u32) {
         self.server().mute = count;

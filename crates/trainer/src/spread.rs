@@ -85,11 +85,11 @@ mod tests {
             samples.select(&spread(&samples, 40))
         };
         let (rare, often) = (chosen(200), chosen(1600));
-        // Every pose of the one has one of the other near.
+        // Every pose of the one has one of the other near: nearer than two of them are to each other.
         for row in rare.iter_rows() {
             let near = often.iter_rows().map(|other| square_distance(row, other));
             let nearest = near.fold(f64::INFINITY, f64::min);
-            assert!(nearest < 0.2 * 0.2, "{row:?}: {nearest}");
+            assert!(nearest < 0.3 * 0.3, "{row:?}: {nearest}");
         }
     }
 

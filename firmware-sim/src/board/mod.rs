@@ -3,14 +3,17 @@
 
 mod flash;
 mod interrupts;
+mod restart;
 mod stack;
 mod time;
 mod uart;
 mod watchdog;
 
 pub use flash::PsramSlot;
+pub use restart::restart;
 pub use stack::StackWatch;
 pub use time::{SystemTime, wait_for_interrupt};
+use bridge::protocol::message::Restart;
 use uart::Uart;
 pub use uart::{Port, bytes_lost};
 pub use watchdog::Watchdog;
@@ -38,6 +41,8 @@ pub struct Board {
     pub watchdog: Watchdog,
     /// Tells how deep the stack has been.
     pub stack: StackWatch,
+    /// Why the machine started.
+    pub started: Restart,
 }
 
 impl Board {
@@ -58,6 +63,7 @@ impl Board {
             slots,
             watchdog: Watchdog::new(),
             stack: StackWatch::start(),
+            started: restart::take(),
         })
     }
 }

@@ -50,6 +50,8 @@ pub(super) struct Axis {
     pub inner_object: Option<f32>,
     /// Software limits in place of the model's, counts.
     pub limits: Option<(f32, f32)>,
+    /// Its motor does not turn, whatever it is told.
+    pub dead: bool,
     pub detection: Detection,
     contact: Option<Contact>,
     moving: bool,
@@ -66,6 +68,7 @@ impl Axis {
             object: None,
             inner_object: None,
             limits: None,
+            dead: false,
             detection: Detection::AtPosition,
             contact: None,
             moving: false,
@@ -79,6 +82,10 @@ impl Axis {
     /// another axis; returns whether that happened.
     pub fn step(&mut self, order: &Order, seconds: f32, blocked_at: impl Fn(f32) -> bool) -> bool {
         self.squeeze = self.squeeze.saturating_sub(1);
+        if self.dead {
+            self.still();
+            return false;
+        }
         let (open, closed) = self.limits.unwrap_or(order.limits);
         let target = order.target.clamp(open, closed);
         if self.held_by_contact(order) {

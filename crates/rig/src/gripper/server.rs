@@ -47,6 +47,29 @@ pub(super) struct Server {
     reply_at: Instant,
     pub mute: u32,
     pub reply_delay: Duration,
+    pub lies: Lies,
+}
+
+/// What the status says that is not so.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Lies {
+    /// Counts added to each position.
+    pub position: [i16; 4],
+    /// What every echo reads.
+    pub echo: Option<u8>,
+}
+
+impl Lies {
+    fn tell(&self, block: &mut [u8; 16]) {
+        for (axis, offset) in self.position.iter().enumerate() {
+            let at = 3 + 3 * axis;
+            let told = (i16::from(block[at + 1]) + offset).clamp(0, 255);
+            block[at + 1] = u8::try_from(told).unwrap_or(0);
+            if let Some(echo) = self.echo {
+                block[at] = echo;
+            }
+        }
+    }
 }
 
 impl Server {
@@ -74,6 +97,7 @@ impl Server {
             reply_at: zero,
             mute: 0,
             reply_delay: Duration::from_ticks(0),
+            lies: Lies::default(),
         };
         server.show_status();
         server
@@ -109,10 +133,16 @@ impl Server {
     }
 
     fn model_status(&self) -> [u8; 16] {
-        match &self.model {
+        let mut block = match &self.model {
             Model::Three(three) => three.status(),
             Model::Two(two) => two.status(),
+        };
+        self.lies.tell(&mut block);
+        if self.config.family != Family::ThreeFinger {
+            // Its block ends here.
+            block[6..].fill(0);
         }
+        block
     }
 
     /// Puts the model's state into the registers before the next refresh does.

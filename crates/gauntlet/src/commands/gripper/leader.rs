@@ -22,8 +22,8 @@ const LEAST_LEAD: u8 = 10;
 const SURE: gripper::Duration = gripper::Duration::from_millis(200);
 /// Without a status for this long the move is given up.
 pub(super) const SILENCE: Duration = Duration::from_secs(1);
-/// Nobody looked for this long: the process stood still.
-const STALL: gripper::Duration = gripper::Duration::from_millis(250);
+/// Nobody looked for this long: the process stood still, and what was seen before it is of then.
+const STALL: gripper::Duration = timing::STALE_MOTION;
 /// For the hold after a move that did not end by itself: some fifty cycles.
 const HOLD_WAIT: Duration = Duration::from_millis(500);
 
@@ -102,6 +102,8 @@ impl<'a, const X: usize> Leader<'a, X> {
             // Time in which nobody listened is no silence.
             self.heard = now;
             self.ready_since = None;
+            self.command = None;
+            self.judge.forget();
             self.progress.restart();
         }
         self.looked = now;
@@ -113,7 +115,10 @@ impl<'a, const X: usize> Leader<'a, X> {
         } else if since(now, self.heard) >= ticks(SILENCE) + self.patience {
             return Some(End::Silent);
         }
-        driver.set_motion(self.command.map(|command| self.motion(command)), now);
+        // No motion rests on a position older than it may be itself.
+        let fresh = since(now, self.newest.stamp) <= timing::STALE_MOTION + self.patience;
+        let command = self.command.filter(|_| fresh);
+        driver.set_motion(command.map(|command| self.motion(command)), now);
         None
     }
 
