@@ -152,7 +152,7 @@ impl Running {
 
     /// What it said, once it has ended.
     fn finish(mut self) -> std::process::Output {
-        let mut read = |from: Option<&mut dyn Read>| {
+        let read = |from: Option<&mut dyn Read>| {
             let mut bytes = Vec::new();
             from.map(|from| from.read_to_end(&mut bytes).unwrap());
             bytes
