@@ -53,6 +53,12 @@ fn hand(moves: Arc<AtomicBool>) -> impl Fn(f64) -> [f32; 25] {
 
 impl Bench {
     fn new(more: &[&str]) -> Self {
+        let bench = Self::inactive(more);
+        bench.gripper.preset_active();
+        bench
+    }
+
+    fn inactive(more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let moves = Arc::new(AtomicBool::new(false));
         let glove = VirtualGlove::new(
@@ -61,7 +67,6 @@ impl Bench {
         );
         let (glove_port, glove) = devices::behind_pty(glove);
         let (gripper, gripper_port, path) = devices::gripper(Config::default());
-        gripper.preset_active();
         let log = folder.path().join("run.mcap");
         let words = [
             "teleop",
@@ -370,7 +375,7 @@ fn text_typed_by_mistake_closes_no_clutch_and_a_space_by_itself_does() {
 
 #[test]
 fn a_log_never_replaces_a_file_and_a_bring_up_that_fails_leaves_none() {
-    let bench = Bench::new(&["--engage", "--seconds", "1"]);
+    let bench = Bench::inactive(&["--engage", "--seconds", "1"]);
     std::fs::write(&bench.log, "\u{89}MCAP0\r\nprecious").unwrap();
     let output = run(&bench.arguments());
     assert!(refusal(&output, 2).contains("exists"));
@@ -380,9 +385,9 @@ fn a_log_never_replaces_a_file_and_a_bring_up_that_fails_leaves_none() {
             .ends_with("precious")
     );
     std::fs::remove_file(&bench.log).unwrap();
-    // The hand moves and is never flat.
-    bench.moves.store(true, Ordering::Relaxed);
-    refusal(&run(&bench.arguments()), 1);
+    // Engaged, but not activated: refused at the end of the bring-up.
+    let refused = refusal(&run(&bench.arguments()), 1);
+    assert!(refused.contains("not activated"), "{refused}");
     assert!(!bench.log.exists(), "a file is in the way of the next try");
 }
 
@@ -390,7 +395,7 @@ fn a_log_never_replaces_a_file_and_a_bring_up_that_fails_leaves_none() {
 fn a_log_that_can_grow_no_more_is_told_while_the_run_goes_on_and_stays_readable() {
     let bench = Bench::new(&["--engage", "--seconds", "6"]);
     let line = format!(
-        "ulimit -f 600; exec {} {}",
+        "ulimit -f 300; exec {} {}",
         env!("CARGO_BIN_EXE_gauntlet"),
         bench.arguments.join(" ")
     );
