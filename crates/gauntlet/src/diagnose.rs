@@ -14,7 +14,7 @@ mod serial;
 
 use serde::Serialize;
 
-pub use glove::{glove, no_glove};
+pub use glove::{glove, keeps_registers, no_glove};
 pub use gripper::{gripper, no_gripper};
 pub use place::{Asked, Place};
 

@@ -50,6 +50,7 @@ pub struct Glove {
 pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
     let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
     if answers(&mut port, interrupt) {
+        diagnose::keeps_registers(path, &mut port, interrupt)?;
         return Ok(Glove {
             port,
             switched: false,
@@ -64,6 +65,7 @@ pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
         let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
         interrupt.sleep(SPEED_WAIT);
         if answers(&mut port, interrupt) {
+            diagnose::keeps_registers(path, &mut port, interrupt)?;
             return Ok(Glove {
                 port,
                 switched: true,

@@ -396,6 +396,29 @@ fn teleop_and_doctor_say_the_same_of_a_late_line_and_of_exchanged_ports() {
 }
 
 #[test]
+fn a_register_of_the_glove_that_reads_back_otherwise_is_named_by_doctor_and_teleop() {
+    let odd = || {
+        Scripted::new(|asked: &[u8]| match asked {
+            [0x52, 0x0A, 0x50] => vec![0xF0],
+            [0x57, 0x07, ..] => vec![0x05, 0x13, 0x07],
+            _ => Vec::new(),
+        })
+    };
+    let (_handle, path) = behind_pty(odd());
+    let words = [
+        "I2CClkH (0x08) reads back otherwise",
+        "wrote 0x05, read 0x13",
+    ];
+    contains(&the_wrong_thing("--glove", &path), &words);
+    let (_gripper, _own, gripper_path) = shaped(at_once);
+    let model = support::model().to_str().unwrap();
+    let ports = ["teleop", "--glove", &path, "--gripper", &gripper_path];
+    let output = run(&[&ports[..], &["--model", model]].concat());
+    assert_eq!(output.status.code(), Some(1));
+    contains(&text(&output.stderr), &words);
+}
+
+#[test]
 fn teleop_refuses_a_gripper_that_cannot_follow_and_says_what_moves_it() {
     let model = ["--model", "none.safetensors", "--gripper-model", "hande"];
     let ports = ["teleop", "--glove", "/dev/a", "--gripper", "/dev/b"];

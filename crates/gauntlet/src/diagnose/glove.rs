@@ -16,7 +16,7 @@ use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::port::{BAUD, Port};
 use crate::ports;
-use bridge_line::{ask, nobody, survey};
+use bridge_line::{UNKEPT_NEXT, ask, nobody, survey, unkept};
 
 /// The SC18IM's speed after power-on.
 const RESET_BAUD: u32 = 9_600;
@@ -40,7 +40,9 @@ pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
     let mut findings = Findings::default();
     if let Some((port, baud)) = find(path, &BAUDS, &mut findings, interrupt) {
         let mut port = port;
-        if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
+        if let Some(what) = unkept(&mut port, interrupt) {
+            findings.wrong("bridge", what, UNKEPT_NEXT);
+        } else if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
             sensors::sensors(port, baud, address, &mut findings, interrupt);
         }
     }
@@ -64,6 +66,20 @@ pub fn no_glove(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
             Failure::new(format!("{what} in time, though it answers now"), doctor)
         }
         None => Failure::new(what, doctor),
+    }
+}
+
+/// A register of the glove's serial bridge that does not keep what the driver writes into it: no sensor would answer.
+///
+/// # Errors
+/// The failure that names it.
+pub fn keeps_registers(path: &Path, port: &mut Port, interrupt: &Interrupt) -> Result<(), Failure> {
+    match unkept(port, interrupt) {
+        None => Ok(()),
+        Some(what) => Err(Failure::new(
+            format!("the glove on {} cannot be used: {what}", path.display()),
+            UNKEPT_NEXT,
+        )),
     }
 }
 

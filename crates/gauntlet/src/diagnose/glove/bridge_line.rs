@@ -18,6 +18,8 @@ const LISTEN: Duration = Duration::from_millis(60);
 const IDLE: Duration = Duration::from_millis(700);
 /// Good answers that are enough.
 const ENOUGH: usize = 4;
+/// Times a register must read otherwise.
+const TRIES: usize = 3;
 /// Questions at most; and without any good answer.
 const MOST: usize = 7;
 const HOPELESS: usize = 3;
@@ -82,6 +84,36 @@ pub fn survey(port: &mut Port, interrupt: &Interrupt) -> Survey {
     }
     survey
 }
+
+/// Writes the I²C clock and timeout as the driver does, and reads them back: the first register that reads otherwise every
+/// time, in words. Nothing where no whole answer comes: that is told elsewhere.
+pub fn unkept(port: &mut Port, interrupt: &Interrupt) -> Option<String> {
+    const NAMES: [&str; 3] = ["I2CClkL (0x07)", "I2CClkH (0x08)", "I2CTO (0x09)"];
+    let wrote = [
+        timing::I2C_DIVIDER,
+        timing::I2C_DIVIDER,
+        timing::I2C_TIMEOUT,
+    ];
+    let [low, high, timeout] = wrote;
+    let set = [0x57, 0x07, low, 0x08, high, 0x09, timeout, 0x50];
+    let read = [0x52, 0x07, 0x50, 0x52, 0x08, 0x50, 0x52, 0x09, 0x50];
+    let question = [&set[..], &read[..]].concat();
+    let mut told = None;
+    for _ in 0..TRIES {
+        let heard = ask(port, &question, NAMES.len(), WAIT, interrupt);
+        let whole = heard.len() == NAMES.len();
+        let other = (0..NAMES.len()).find(|at| whole && heard[*at] != wrote[*at])?;
+        told = Some(format!(
+            "the serial bridge's register {} reads back otherwise: wrote {:#04X}, read {:#04X}",
+            NAMES[other], wrote[other], heard[other]
+        ));
+    }
+    told
+}
+
+/// What to try then.
+pub const UNKEPT_NEXT: &str = "unplugging the glove and plugging it in again; if it stays, the chip is no SC18IM700 or 704, or another \
+     program writes to it";
 
 fn judge(heard: &[u8]) -> Met {
     match heard {
