@@ -9,6 +9,7 @@ mod board;
 
 use board::{Board, Port, PsramSlot, StackWatch, SystemTime, Watchdog, wait_for_interrupt};
 use bridge::gripper::driver::ThreeFinger;
+use bridge::protocol::message::Restart;
 use bridge::protocol::{self, Outcome, Server};
 use bridge::{App, Config, Instant, Platform, WeightsStore, glove, gripper};
 
@@ -40,7 +41,7 @@ fn main() -> ! {
         run(board);
     }
     // Unreachable on a whole machine: the board is taken once. A reset is the only thing left to try.
-    cortex_m::peripheral::SCB::sys_reset()
+    board::restart()
 }
 
 fn run(board: Board) {
@@ -52,7 +53,20 @@ fn run(board: Board) {
         slots,
         mut watchdog,
         mut stack,
+        started,
     } = board;
+    let mut app = bridge(time, glove, gripper, slots);
+    let mut server = Server::new(host);
+    watchdog.start();
+    while turn(&mut app, &mut server, &mut watchdog, &mut stack, started) == Outcome::Continue {}
+    board::restart()
+}
+
+/// The bridge on its devices.
+///
+/// A function of its own, so that what it is made of does not stay on the stack beside it.
+#[inline(never)]
+fn bridge(time: SystemTime, glove: Port, gripper: Port, slots: [PsramSlot; 2]) -> Bridge {
     let store = WeightsStore::new(slots, bridge::app::expected(AXES));
     let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
     let config = gripper::driver::Config {
@@ -60,11 +74,7 @@ fn run(board: Board) {
         ..gripper::driver::Config::default()
     };
     let gripper = ThreeFinger::new(gripper, config);
-    let mut app: Bridge = App::new(Machine { time }, scanner, gripper, store, Config::default());
-    let mut server = Server::new(host);
-    watchdog.start();
-    while turn(&mut app, &mut server, &mut watchdog, &mut stack) == Outcome::Continue {}
-    cortex_m::peripheral::SCB::sys_reset()
+    App::new(Machine { time }, scanner, gripper, store, Config::default())
 }
 
 /// One turn of the loop: the bridge, the host, then sleep until something is due.
@@ -76,12 +86,14 @@ fn turn(
     server: &mut Server<Port>,
     watchdog: &mut Watchdog,
     stack: &mut StackWatch,
+    started: Restart,
 ) -> Outcome {
     let due = app.step();
     let outcome = server.poll(app.telemetry().now, app);
     server.tell_board(protocol::Board {
         bytes_lost: board::bytes_lost(),
         stack_used: stack.look(),
+        restart: started,
     });
     watchdog.feed();
     app.platform_mut().wait_until(due);
@@ -91,5 +103,5 @@ fn turn(
 /// Nothing in the loop panics (a check on the linked program shows it); start-up may.
 #[panic_handler]
 fn panic(_: &core::panic::PanicInfo<'_>) -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
+    board::restart()
 }

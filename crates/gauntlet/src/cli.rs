@@ -157,8 +157,8 @@ pub struct Simulate {
 /// How a gripper's line differs from that of a gripper as delivered.
 #[derive(Debug, Clone, Copy, Default, Args)]
 pub struct LineOptions {
-    /// The gripper's Modbus unit (slave id), if not 9 on a serial line or 2 over TCP.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=247))]
+    /// The gripper's Modbus unit (slave id), if not 9 on a serial line (1 to 247) or 2 over TCP (0 to 255).
+    #[arg(long, value_name = "N")]
     pub unit: Option<u8>,
     /// Speed of the gripper's serial line, if not 115200.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
@@ -174,21 +174,13 @@ impl LineOptions {
     /// # Errors
     /// A failure of usage: a speed for a line that has none.
     pub fn settings(&self, path: &Path) -> Result<Settings, Failure> {
-        let is_tcp = crate::tcp::Address::parse(path)?.is_some();
-        if let Some(baud) = self.baud.filter(|_| is_tcp) {
-            return Err(Failure::usage(
-                format!(
-                    "--baud {baud} is the speed of a serial line, and {} is none",
-                    path.display()
-                ),
-                "the same without --baud",
-            ));
-        }
-        Ok(Settings {
+        let settings = Settings {
             unit: self.unit,
             baud: self.baud,
             patience: self.patience,
-        })
+        };
+        settings.check(path)?;
+        Ok(settings)
     }
 }
 

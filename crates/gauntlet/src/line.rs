@@ -39,6 +39,24 @@ pub fn patience(text: &str) -> Result<Duration, String> {
 }
 
 impl Settings {
+    /// Whether a line at `path` can have them.
+    ///
+    /// # Errors
+    /// A failure of usage: a speed for a network, a unit that no serial line has.
+    pub fn check(&self, path: &Path) -> Result<(), Failure> {
+        match (tcp::Address::parse(path)?, self.baud, self.unit) {
+            (Some(address), Some(baud), _) => Err(Failure::usage(
+                format!("--baud {baud}: {address} is a network address, which has no baud rate"),
+                "the same without --baud",
+            )),
+            (None, _, Some(unit @ (0 | 248..))) => Err(Failure::usage(
+                format!("--unit {unit}: a serial line has units 1 to 247"),
+                "the unit that `gauntlet doctor` finds",
+            )),
+            _ => Ok(()),
+        }
+    }
+
     /// The patience asked for; none where it was not.
     pub fn patience(&self) -> Duration {
         self.patience.unwrap_or(Duration::ZERO).min(MOST_PATIENCE)
@@ -60,17 +78,9 @@ impl Line {
     /// # Errors
     /// A failure that says why it does not open, or that a speed was given to a line without one.
     pub fn open(path: &Path, settings: Settings, interrupt: &Interrupt) -> Result<Self> {
+        settings.check(path)?;
         Ok(match tcp::Address::parse(path)? {
             Some(address) => {
-                if let Some(baud) = settings.baud {
-                    return Err(Failure::usage(
-                        format!(
-                            "--baud {baud}: {address} is a network address, which has no baud rate"
-                        ),
-                        "the same without --baud",
-                    )
-                    .into());
-                }
                 let unit = settings.unit.unwrap_or(tcp::UNIT);
                 Self::Tcp(tcp::Port::connect_with(
                     &address,

@@ -1,6 +1,7 @@
 //! Files the tool writes: never over an input, never over something else than a file of their own kind.
 
 use std::io::Read;
+use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -124,12 +125,12 @@ fn is_same(a: &Path, b: &Path) -> bool {
 /// # Errors
 /// A usage failure that names the path.
 pub fn check(path: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
-    let refuse = |why: &str| {
-        let what = format!("{} is not written: {why}", path.display());
-        Err(Failure::usage(what, "another name, in a folder that exists").into())
-    };
+    let refuse = |why: &str| Err(refusal(path, why));
     if !folder_of(path).is_dir() {
         return refuse("its folder does not exist");
+    }
+    if path.as_os_str().as_bytes().ends_with(b"/") {
+        return refuse("it names a folder");
     }
     if inputs.iter().any(|input| is_same(path, input)) {
         return refuse("it is an input of this very command");
@@ -139,12 +140,23 @@ pub fn check(path: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
     {
         return refuse(&why);
     }
-    if kind != Kind::Log
-        && let Err(error) = whole_file::probe(path, ROOM)
-    {
-        return refuse(&error.to_string());
+    match kind {
+        Kind::Log => Ok(()),
+        _ => room(path),
     }
-    Ok(())
+}
+
+/// Tries whether a file could be written to `path` now.
+///
+/// # Errors
+/// A usage failure that names the path.
+pub fn room(path: &Path) -> Result<()> {
+    whole_file::probe(path, ROOM).map_err(|error| refusal(path, &error.to_string()))
+}
+
+fn refusal(path: &Path, why: &str) -> anyhow::Error {
+    let what = format!("{} is not written: {why}", path.display());
+    Failure::usage(what, "another name, in a folder that exists and has room").into()
 }
 
 /// Why what is there is not replaced by something of this kind.
@@ -165,7 +177,7 @@ fn unlike(path: &Path, kind: Kind, there: &std::fs::Metadata) -> Option<String> 
 mod tests {
     use super::*;
 
-    fn refusal(path: &Path, kind: Kind, inputs: &[&Path]) -> String {
+    fn said(path: &Path, kind: Kind, inputs: &[&Path]) -> String {
         check(path, kind, inputs).unwrap_err().to_string()
     }
 
@@ -177,7 +189,7 @@ mod tests {
         std::fs::write(&input, "time_s").unwrap();
         std::os::unix::fs::symlink(&input, &link).unwrap();
         for path in [&input, &link] {
-            assert!(refusal(path, Kind::Model, &[&input]).contains("an input"));
+            assert!(said(path, Kind::Model, &[&input]).contains("an input"));
         }
     }
 
@@ -212,16 +224,21 @@ mod tests {
     fn one_file_under_two_names_is_one_though_it_is_not_there_yet() {
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().join("m");
-        for other in ["m", "./m", "../m"] {
-            let other = folder.path().join("sub").join("..").join(other);
-            std::fs::create_dir_all(folder.path().join("sub")).unwrap();
-            let is_same = other.canonicalize().is_ok() || !other.ends_with("../m");
-            assert_eq!(check(&other, Kind::Checkpoint, &[&out]).is_err(), is_same);
+        let sub = folder.path().join("sub");
+        std::fs::create_dir(&sub).unwrap();
+        for (other, is_same) in [
+            ("../m", true),
+            (".././m", true),
+            ("m", false),
+            ("../n", false),
+        ] {
+            let refused = check(&sub.join(other), Kind::Checkpoint, &[&out]).is_err();
+            assert_eq!(refused, is_same, "{other}");
         }
         std::fs::write(&out, "").unwrap();
         let hard = folder.path().join("hard");
         std::fs::hard_link(&out, &hard).unwrap();
-        assert!(refusal(&hard, Kind::Checkpoint, &[&out]).contains("an input"));
+        assert!(said(&hard, Kind::Checkpoint, &[&out]).contains("an input"));
     }
 
     #[test]
@@ -244,10 +261,12 @@ mod tests {
     fn what_cannot_be_written_is_told_before_the_work_and_nothing_is_left() {
         let folder = tempfile::tempdir().unwrap();
         let long = folder.path().join("n".repeat(250));
+        let open = folder.path().join("new/");
+        assert!(said(&open, Kind::Model, &[]).contains("names a folder"));
         for kind in [Kind::Model, Kind::Checkpoint, Kind::Image] {
-            assert!(refusal(&long, kind, &[]).contains("is not written"));
+            assert!(said(&long, kind, &[]).contains("is not written"));
             // A folder in which nobody may write, root neither.
-            assert!(refusal(Path::new("/proc/m"), kind, &[]).contains("is not written"));
+            assert!(said(Path::new("/proc/m"), kind, &[]).contains("is not written"));
             check(&folder.path().join("fine"), kind, &[]).unwrap();
         }
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);

@@ -268,14 +268,14 @@ mod tests {
         assert_ne!(all, measuring_targets(3));
     }
 
-    /// One layer of every fourth angle: smooth, without folds.
+    /// Sums of two angles each: smooth, without folds.
     fn smooth() -> Model {
         let mut f = trainer::network::Network::zeros(25, 4, 4);
         for axis in 0..4 {
             f.w1[axis * 25 + 4 * axis + 5] = 0.9;
             f.w1[axis * 25 + 4 * axis + 6] = 0.4;
-            f.b1[axis] = -0.7;
             f.w2[axis * 4 + axis] = 0.9;
+            f.b2[axis] = -0.8;
         }
         Model {
             g: trainer::network::Network::zeros(4, 4, 25),
@@ -339,7 +339,8 @@ mod tests {
         let few = every(60);
         let ours = Measured::of_hand(&model, (&few, &targets), String::new());
         let paper = Measured::of(&model, (&few, &targets), &GRIPPER, None, String::new());
-        assert!(ours.volume_occupancy.unwrap() < 0.5 * paper.volume_occupancy.unwrap());
+        let [ours_vo, paper_vo] = [&ours, &paper].map(|m| m.volume_occupancy.unwrap());
+        assert!(ours_vo < 0.7 * paper_vo, "{ours_vo} {paper_vo}");
         let fault = Quality::from_measured(&ours).fault().unwrap();
         assert!(fault.contains("20 poses are few"), "{fault}");
     }

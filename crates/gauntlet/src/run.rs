@@ -220,7 +220,7 @@ impl Run {
             self.engage();
         }
         let started = Instant::now();
-        self.numbers.begin();
+        self.numbers.begin(self.clock.now());
         let mut last_round = started;
         loop {
             // Nobody sees the view: as if nobody were there.

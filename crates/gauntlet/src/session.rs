@@ -80,6 +80,8 @@ pub struct Parts {
     pub glove: Port,
     /// The gripper's line.
     pub gripper: Line,
+    /// Unit, speed and patience of that line.
+    pub line: Settings,
     /// The weights image.
     pub image: Vec<u8>,
     /// The bridge's configuration.
@@ -141,7 +143,7 @@ impl Session {
                     },
                 )
                 .with_set_baud(Port::set_baud);
-                let config = parts.gripper.driver_config(Settings::default());
+                let config = parts.gripper.driver_config(parts.line);
                 let gripper = ThreeFinger::new(parts.gripper, config);
                 let mut app: PcApp = App::new(platform, scanner, gripper, store, parts.config);
                 worker.run(&mut app)

@@ -284,9 +284,6 @@ fn a_hand_s_table_ends_soon_after_ctrl_c_and_goes_on_with_what_is_done() {
     let asked = std::time::Instant::now();
     let output = finish(child);
     let said = refusal(&output, 1);
-    assert!(
-        said.contains("interrupted") && said.contains("the same command"),
-        "{said}"
-    );
+    assert!(said.contains("interrupted"), "{said}");
     assert!(asked.elapsed() < Duration::from_secs(20));
 }

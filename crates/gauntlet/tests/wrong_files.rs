@@ -332,7 +332,8 @@ fn text_in_another_encoding_is_named_with_the_way_out() {
     let output = run(&["train", "--poses", path(&poses), "--out", path(&out)]);
     let error = refusal(&output, 1);
     assert!(
-        error.contains("UTF-16") && error.contains("iconv"),
+        error.contains("UTF-16") && error.contains("UTF-8"),
         "{error}"
     );
+    assert!(text(&output.stderr).contains("try: iconv -f UTF-16LE"));
 }

@@ -33,7 +33,12 @@ pub mod register {
     pub const PWR_MODE: u8 = 0x3E;
     /// Reset, self test, clock source.
     pub const SYS_TRIGGER: u8 = 0x3F;
+    /// Page 1: 16 bytes that no other sensor has.
+    pub const UNIQUE_ID: u8 = 0x50;
 }
+
+/// What tells a sensor from all others.
+pub type UniqueId = [u8; 16];
 
 /// Bytes of one sample.
 pub const SAMPLE_BYTES: usize = 8;
@@ -135,7 +140,14 @@ pub enum Error {
     },
     /// Another chip answers at the address: CHIP_ID is not A0.
     ChipId(u8),
-    /// A register did not keep what was written.
+    /// The sensor with the unique id of another segment's answers here: the multiplexer does not select.
+    SameSensor {
+        /// That segment.
+        segment: u8,
+    },
+    /// Another sensor answers here than at the first bring-up.
+    OtherSensor,
+    /// A register did not keep what was written, or did not give the same twice.
     ReadBack {
         /// Register of the sensor.
         register: u8,
@@ -163,6 +175,11 @@ impl core::fmt::Display for Error {
             Error::Mux(cause) => write!(f, "multiplexer: {cause}"),
             Error::Bus { register, cause } => write!(f, "register {register:#04X}: {cause}"),
             Error::ChipId(id) => write!(f, "chip id {id:#04X}, a BNO055 has 0xA0"),
+            Error::SameSensor { segment } => {
+                let name = crate::hand::SEGMENT_NAMES.get(usize::from(*segment));
+                write!(f, "the sensor on {} answers here", name.unwrap_or(&"?"))
+            }
+            Error::OtherSensor => f.write_str("another sensor answers than at first"),
             Error::ReadBack {
                 register,
                 wrote,

@@ -19,6 +19,7 @@ mod machine;
 mod sensor;
 mod together;
 mod twins;
+mod unique;
 
 /// One sensor's part of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -153,6 +154,13 @@ pub enum Finding {
         /// The channels, two at least.
         channels: u8,
     },
+    /// By its unique id another sensor answers than the one of this segment: it is not used.
+    WrongSensor {
+        /// The segment.
+        segment: u8,
+        /// [`imu::Error::SameSensor`] or [`imu::Error::OtherSensor`].
+        error: imu::Error,
+    },
 }
 
 /// Most findings kept for [`BusScanner::next_finding`]; one for every sensor.
@@ -179,6 +187,7 @@ impl core::fmt::Display for Finding {
                 }
                 f.write_str(" give the same bits: it does not select")
             }
+            Finding::WrongSensor { segment, error } => write!(f, "{}: {error}", name(segment)),
         }
     }
 }
@@ -223,6 +232,7 @@ pub struct BusScanner<B> {
     sensors: [Sensor; SEGMENT_COUNT],
     frozen: frozen::Detector,
     twins: twins::Detector,
+    ids: unique::Ids,
     findings: heapless::Deque<Finding, FINDINGS_MAX>,
     job: Option<machine::Job>,
     step: Option<machine::ActiveStep>,
@@ -273,6 +283,7 @@ impl<B: Bus> BusScanner<B> {
             sensors: core::array::from_fn(|_| Sensor::new()),
             frozen: frozen::Detector::new(),
             twins: twins::Detector::new(),
+            ids: unique::Ids::new(),
             findings: heapless::Deque::new(),
             job: None,
             step: None,

@@ -5,7 +5,7 @@
 mod common;
 
 use common::{ALL, Bench, waving};
-use glove::imu::Fault;
+use glove::imu::{self, Fault};
 use glove::scan::{Config, Finding, Frame, Health};
 
 /// Flat for three seconds, as at a calibration, then every finger moves.
@@ -176,12 +176,50 @@ fn a_multiplexer_that_ignores_selections_but_reads_back_right_is_named_within_0_
 }
 
 #[test]
-fn a_multiplexer_that_never_selected_never_gives_a_usable_frame_and_is_named() {
+fn a_multiplexer_that_never_selected_is_named_by_the_sensors_unique_ids() {
     let mut bench = Bench::new(|_| [0.0; 25]);
     bench.glove.stick_mux(Some(3));
     let frames = bench.until(5_000_000);
-    // The sensors that are none reset one another for ever; what is read besides is found out.
-    assert!(frames.iter().all(|frame| frame.good().count_ones() < 15));
-    let named = |finding: &Finding| matches!(finding, Finding::Twins { .. });
-    assert!(findings(&mut bench).iter().any(named));
+    // Whoever has another's id is named with that other, and both are in doubt.
+    assert!(frames.iter().all(|frame| frame.good().count_ones() < 3));
+    let told = findings(&mut bench);
+    for k in 0..16u8 {
+        let named = |f: &Finding| match f {
+            Finding::WrongSensor {
+                segment,
+                error: imu::Error::SameSensor { segment: other },
+            } => *segment == k || *other == k,
+            _ => false,
+        };
+        assert!(told.iter().any(named), "{k}: {told:?}");
+    }
+    // It selects again: everything is well by itself.
+    bench.glove.stick_mux(None);
+    assert_eq!(bench.for_ms(8_000).last().map(Frame::good), Some(ALL));
+}
+
+#[test]
+fn a_sensor_that_is_another_than_at_first_is_named_and_not_used() {
+    let mut bench = Bench::new(waving).up();
+    bench.glove.exchange_sensor(6, 40);
+    bench.glove.reset_sensor(6, bench.clock.now());
+    let mut frames = bench.for_ms(500);
+    // Its supply fails for longer: it is brought up anew.
+    bench.glove.unplug(6, true);
+    frames.extend(bench.for_ms(2_000));
+    bench.glove.unplug(6, false);
+    frames.extend(bench.for_ms(5_000));
+    let last = frames.last().unwrap();
+    assert_eq!(
+        last.samples[6].health,
+        Health::Missing(imu::Error::OtherSensor)
+    );
+    assert_eq!(last.good(), ALL & !(1 << 6));
+    let other = Finding::WrongSensor {
+        segment: 6,
+        error: imu::Error::OtherSensor,
+    };
+    assert_eq!(findings(&mut bench), [other], "told once");
+    bench.glove.exchange_sensor(6, 6);
+    assert_eq!(bench.for_ms(4_000).last().map(Frame::good), Some(ALL));
 }

@@ -1,7 +1,7 @@
 //! The vector table and the exceptions.
 
-use super::time;
 use super::uart::Uart;
+use super::{restart, time};
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{ExceptionFrame, exception};
 
@@ -64,7 +64,13 @@ fn SysTick() {
     time::tick();
 }
 
+/// The watchdog's first count: unless it is fed, the reset follows at the second.
+#[exception]
+unsafe fn NonMaskableInt() {
+    restart::note_watchdog();
+}
+
 #[exception]
 unsafe fn HardFault(_frame: &ExceptionFrame) -> ! {
-    cortex_m::peripheral::SCB::sys_reset()
+    restart::restart()
 }

@@ -3,12 +3,15 @@
 
 mod flash;
 mod interrupts;
+mod restart;
 mod stack;
 mod time;
 mod uart;
 mod watchdog;
 
+use bridge::protocol::message::Restart;
 pub use flash::PsramSlot;
+pub use restart::restart;
 pub use stack::StackWatch;
 pub use time::{SystemTime, wait_for_interrupt};
 use uart::Uart;
@@ -38,6 +41,8 @@ pub struct Board {
     pub watchdog: Watchdog,
     /// Tells how deep the stack has been.
     pub stack: StackWatch,
+    /// Why the machine started.
+    pub started: Restart,
 }
 
 impl Board {
@@ -58,6 +63,7 @@ impl Board {
             slots,
             watchdog: Watchdog::new(),
             stack: StackWatch::start(),
+            started: restart::take(),
         })
     }
 }

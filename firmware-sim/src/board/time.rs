@@ -46,9 +46,15 @@ impl SystemTime {
     }
 }
 
-/// Sleeps until the next interrupt: a byte on a line or the next millisecond.
+/// Sleeps until the next interrupt, a byte on a line or the next millisecond, unless bytes have come since the last call.
+///
+/// Looking and falling asleep are one: a byte that comes in between stays pending, which ends the sleep at once.
 pub fn wait_for_interrupt() {
-    cortex_m::asm::wfi();
+    critical_section::with(|section| {
+        if !super::uart::bytes_came(section) {
+            cortex_m::asm::wfi();
+        }
+    });
 }
 
 /// Wakes the processor and sees every wrap of the timer; called by the SysTick exception only.

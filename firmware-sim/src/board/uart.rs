@@ -65,6 +65,8 @@ static LINES: [Mutex<Line>; 3] = [
     Mutex::new(Line::new()),
     Mutex::new(Line::new()),
 ];
+/// Bytes have come since [`bytes_came`] was asked.
+static CAME: Mutex<Cell<bool>> = Mutex::new(Cell::new(false));
 static OPENED: Mutex<Cell<[bool; 3]>> = Mutex::new(Cell::new([false; 3]));
 
 impl Uart {
@@ -106,21 +108,24 @@ impl Uart {
         critical_section::with(|section| {
             let line = self.line(section);
             self.write(INTERRUPT, INTERRUPT_TRANSMIT | INTERRUPT_RECEIVE);
-            self.take_received(line);
+            if self.take_received(line) {
+                CAME.borrow(section).set(true);
+            }
             self.give_to_send(line);
         });
     }
 
-    fn take_received(self, line: &Line) {
+    /// Returns whether there were bytes.
+    fn take_received(self, line: &Line) -> bool {
         // Bounded: a line that never ends must not keep the processor.
-        for _ in 0..16 {
+        for taken in 0..16 {
             let state = self.read(STATE);
             if state & STATE_RECEIVE_OVERRUN != 0 {
                 self.write(STATE, STATE_RECEIVE_OVERRUN);
                 line.lose();
             }
             if state & STATE_RECEIVE_FULL == 0 {
-                return;
+                return taken > 0;
             }
             let byte = self.read(DATA) as u8;
             let kept = line
@@ -131,6 +136,7 @@ impl Uart {
                 line.lose();
             }
         }
+        true
     }
 
     fn give_to_send(self, line: &Line) {
@@ -226,6 +232,11 @@ impl embedded_io::Write for Port {
     fn flush(&mut self) -> Result<(), Self::Error> {
         Ok(())
     }
+}
+
+/// Whether bytes have come since the last call.
+pub(super) fn bytes_came(section: CriticalSection<'_>) -> bool {
+    CAME.borrow(section).replace(false)
 }
 
 /// Bytes that each line has lost since the start: host, glove, gripper.

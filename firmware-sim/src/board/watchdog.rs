@@ -35,6 +35,7 @@ impl Watchdog {
     /// Starts the count afresh.
     pub fn feed(&mut self) {
         write(INTERRUPT_CLEAR, 1);
+        super::restart::forget();
     }
 }
 

@@ -59,6 +59,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let parts = Parts {
         glove: glove.port,
         gripper,
+        line,
         image,
         config,
     };

@@ -50,6 +50,8 @@ pub struct Answer {
     pub after: Vec<u8>,
     /// The unit of a second answer.
     pub second: Option<u8>,
+    /// The answer to an earlier question came with it.
+    pub earlier: bool,
 }
 
 /// A read of `quantity` status registers.
@@ -80,21 +82,29 @@ pub fn judge(unit: u8, quantity: u16, sent: &[u8], heard: &[u8]) -> Came {
     let frames = found(rest);
     if let Some(at) = frames
         .iter()
-        .position(|f| wanted(f) && f.start <= MOST_BEFORE)
+        .position(|f| wanted(f) && f.gap <= MOST_BEFORE)
     {
         let frame = &frames[at];
         let end = frame.start + frame.bytes;
-        let second = frames.iter().enumerate().find(|(k, _)| *k != at);
-        let after = match second {
-            Some(_) => Vec::new(),
-            None => rest.get(end..).unwrap_or(&[]).to_vec(),
+        let others = || {
+            frames
+                .iter()
+                .enumerate()
+                .filter(|(k, _)| *k != at)
+                .map(|(_, f)| f)
+        };
+        let second = others().find(|other| wanted(other) || other.unit != unit);
+        let after = match frames.get(at + 1) {
+            Some(_) => &[],
+            None => rest.get(end..).unwrap_or(&[]),
         };
         return Came::Answer(Answer {
             data: rest.get(frame.start + 3..end - 2).unwrap_or(&[]).to_vec(),
             echoed,
-            before: rest[..frame.start].to_vec(),
-            after,
-            second: second.map(|(_, frame)| frame.unit),
+            before: rest[frame.start - frame.gap..frame.start].to_vec(),
+            after: after.to_vec(),
+            second: second.map(|frame| frame.unit),
+            earlier: second.is_none() && frames.len() > 1,
         });
     }
     if let Some(frame) = frames.first() {
@@ -132,6 +142,8 @@ pub fn holds_answer(bytes: &[u8]) -> bool {
 /// A frame among bytes.
 struct Found {
     start: usize,
+    /// Bytes between the frame before it and this one.
+    gap: usize,
     bytes: usize,
     unit: u8,
     exception: Option<u8>,
@@ -139,13 +151,15 @@ struct Found {
 
 /// The frames that answer a read of registers, one after another.
 fn found(bytes: &[u8]) -> Vec<Found> {
-    let mut frames = Vec::new();
-    let mut start = 0;
+    let mut frames: Vec<Found> = Vec::new();
+    let (mut start, mut last_end) = (0, 0);
     while start + EXCEPTION_FRAME <= bytes.len() {
         match frame_at(bytes, start) {
             Some(frame) => {
+                let gap = start - last_end;
                 start += frame.bytes;
-                frames.push(frame);
+                last_end = start;
+                frames.push(Found { gap, ..frame });
             }
             None => start += 1,
         }
@@ -167,6 +181,7 @@ fn frame_at(bytes: &[u8], start: usize) -> Option<Found> {
     let (body, crc) = bytes.get(start..start + length)?.split_at(length - 2);
     (crc16(body).to_le_bytes() == *crc).then_some(Found {
         start,
+        gap: 0,
         bytes: length,
         unit,
         exception,
@@ -249,6 +264,15 @@ mod tests {
             second,
             Answer {
                 second: Some(7),
+                ..plain.clone()
+            }
+        );
+        let late = frame(&[9, 3, 4, 1, 2, 3, 4]);
+        let after_a_late_one = answer(&[&late[..], &REPLY].concat());
+        assert_eq!(
+            after_a_late_one,
+            Answer {
+                earlier: true,
                 ..plain.clone()
             }
         );

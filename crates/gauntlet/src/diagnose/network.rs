@@ -65,6 +65,7 @@ pub(super) fn network(
         return unanswered(address, wire, &tally, place, findings, interrupt);
     }
     let faults = findings.faults();
+    tally.tell_of_units(&mut wire, place, findings, interrupt);
     let needed = tally.tell(place, findings);
     let patient = needed.map_or(*place, |needed| place.with_patience(needed));
     if findings.faults() == faults {
@@ -89,7 +90,14 @@ fn exchanges(wire: &mut Wire, unit: u8, tally: &mut Tally, interrupt: &Interrupt
             tally.answers.push(exchange);
         } else {
             let is_over = wire.has_ended() || matches!(exchange.came, Came::Malformed(_));
-            tally.instead.get_or_insert(exchange.came);
+            // Silence says least.
+            if tally
+                .instead
+                .as_ref()
+                .is_none_or(|came| *came == Came::Silence)
+            {
+                tally.instead = Some(exchange.came);
+            }
             if is_over {
                 break;
             }
@@ -136,19 +144,6 @@ impl Tally {
                  `gauntlet doctor --gripper /dev/ttyUSB0`",
             );
         }
-        let united = with(&|exchange| exchange.unit != place.unit());
-        if let Some(first) = united.first() {
-            findings.wrong(
-                "unit",
-                format!(
-                    "{} of {total} answers say that they come from unit {}, not from unit {}",
-                    united.len(),
-                    first.unit,
-                    place.unit()
-                ),
-                place.with_unit(first.unit).command("gripper status"),
-            );
-        }
         let trailed = with(&|exchange| !exchange.rest.is_empty());
         if let Some(first) = trailed.first() {
             findings.wrong(
@@ -163,6 +158,33 @@ impl Tally {
             );
         }
         self.tell_of_lateness(place, findings)
+    }
+
+    /// Answers may say that they come from another unit; that one may be the right one to ask.
+    fn tell_of_units(
+        &self,
+        wire: &mut Wire,
+        place: &Place<'_>,
+        findings: &mut Findings,
+        interrupt: &Interrupt,
+    ) {
+        let others: Vec<u8> = self.answers.iter().map(|exchange| exchange.unit).collect();
+        let Some(other) = others.iter().copied().find(|unit| *unit != place.unit()) else {
+            return;
+        };
+        let count = others.iter().filter(|unit| **unit != place.unit()).count();
+        let again = wire.ask(other, READ_INPUT, WAIT_UNIT, interrupt);
+        let next = if again.came.is_answer() && again.unit == other {
+            place.with_unit(other).command("gripper status")
+        } else {
+            "the newest firmware of the gripper or gateway: an answer carries the unit of its question".to_owned()
+        };
+        let what = format!(
+            "{count} of {} answers say that they come from unit {other}, not from unit {}",
+            others.len(),
+            place.unit()
+        );
+        findings.wrong("unit", what, next);
     }
 
     fn tell_of_lateness(&self, place: &Place<'_>, findings: &mut Findings) -> Option<Duration> {
@@ -278,6 +300,7 @@ fn unanswered(
     }
     let next = match instead {
         Came::Closed => busy(address, &instead),
+        Came::Late => "a way to the gripper without that delay: Gauntlet waits for 1.2 s at most (--patience 1000)".to_owned(),
         _ => "whether this address and port belong to the gripper (192.168.1.11, port 502 as delivered)".to_owned(),
     };
     findings.wrong("gripper", instead.words(), next);

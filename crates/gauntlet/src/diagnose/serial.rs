@@ -20,6 +20,8 @@ const SILENT: usize = 2;
 const HOPELESS: usize = 4;
 /// For bytes that nobody asked for.
 const LISTEN: Duration = Duration::from_millis(100);
+/// How often, while they come.
+const LISTENS: usize = 6;
 
 /// What several exchanges came to.
 #[derive(Debug, Default)]
@@ -33,10 +35,15 @@ pub struct Tally {
 
 /// Listens, then asks `unit` several times.
 pub fn exchanges(port: &mut Port, unit: u8, baud: u32, interrupt: &Interrupt) -> Tally {
-    let mut tally = Tally {
-        unasked: listen(port, LISTEN, interrupt),
-        ..Tally::default()
-    };
+    let mut tally = Tally::default();
+    // What is still owed to whoever asked before comes first.
+    for _ in 0..LISTENS {
+        let heard = listen(port, LISTEN, interrupt);
+        tally.unasked.extend(&heard);
+        if heard.is_empty() {
+            break;
+        }
+    }
     for quantity in QUANTITIES {
         if tally.is_decided() || interrupt.asked() {
             break;
@@ -183,6 +190,10 @@ impl Tally {
                 format!("{who}: {} of {total} answers were followed by a second one", twice.len()),
                 "unplugging the other device, or giving it a unit number of its own in the maker's tool",
             );
+        }
+        if !with(|a| a.earlier).is_empty() {
+            let what = "the answer to an earlier question came with the new one: answers queue up on the way";
+            findings.note("line", what, "an adapter or a tunnel without the delay");
         }
         let shifted = with(|a| !a.before.is_empty() && a.second.is_none());
         if let Some(first) = shifted.first() {

@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant};
 
 pub mod devices;
+pub mod lines;
 pub mod samples;
 pub mod terminal;
 

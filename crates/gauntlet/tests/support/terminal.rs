@@ -27,7 +27,9 @@ pub struct Terminal {
 impl Terminal {
     /// Starts the tool; what it draws is read all the time.
     pub fn start(arguments: &[&str]) -> Self {
-        let master = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
+        // Not for children: a terminal hangs up when nobody has its master any more.
+        let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+        let master = openpt(flags).unwrap();
         grantpt(&master).unwrap();
         unlockpt(&master).unwrap();
         let size = Winsize {

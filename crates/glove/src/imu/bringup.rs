@@ -10,7 +10,7 @@
 //! starts from a new driver and a mode that was read; it never writes UNIT_SEL and hides the system status, so
 //! these are read and written here; and everything written is read back.
 
-use super::{Config, Error, Mode, register};
+use super::{Config, Error, Mode, UniqueId, register};
 use crate::Duration;
 use crate::bus::{self, MESSAGE_MAX, Transaction};
 use crate::timing;
@@ -35,8 +35,10 @@ const FUSION_RUNNING: u8 = 5;
 /// One step of a bring-up. Between steps the sensor needs time; within one it does not.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Step {
-    /// Chip id, then CONFIG mode (a reset is not taken in another mode).
+    /// Chip id and unique id; nothing is changed before it is known whose they are.
     Identify,
+    /// CONFIG mode (a reset is not taken in another one).
+    Stop,
     /// Reset.
     Reset,
     /// Chip id again, power mode, clock source, units, read back; then the fusion mode.
@@ -57,6 +59,8 @@ pub struct Outcome {
     /// Whether a plain read repeats from the last register written, as the data sheet has it; `None` where the step
     /// did not try.
     pub pointer_stays: Option<bool>,
+    /// The sensor's unique id; `None` where the step did not read it, or it is none (the same byte 16 times).
+    pub unique_id: Option<UniqueId>,
 }
 
 impl Outcome {
@@ -65,6 +69,7 @@ impl Outcome {
             next,
             pause,
             pointer_stays: None,
+            unique_id: None,
         }
     }
 }
@@ -181,6 +186,12 @@ fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result
     match step {
         Step::Identify => {
             check_id(sensor.id()?)?;
+            Ok(Outcome {
+                unique_id: unique_id(i2c, address)?,
+                ..Outcome::then(Some(Step::Stop), NO_PAUSE)
+            })
+        }
+        Step::Stop => {
             // The crate writes a mode only if it differs from the one it believes in: let it believe the chip.
             sensor.get_mode()?;
             sensor.set_mode(BNO055OperationMode::CONFIG_MODE, &mut no_delay)?;
@@ -264,6 +275,24 @@ fn read(i2c: &mut Replay<'_>, address: u8, register: u8) -> Result<u8, Unanswere
     let mut byte = [0];
     i2c.write_read(address, &[register], &mut byte)?;
     Ok(byte[0])
+}
+
+/// Reads the unique id twice from page 1, so that a flipped bit is not taken for another sensor.
+fn unique_id(i2c: &mut Replay<'_>, address: u8) -> Result<Option<UniqueId>, Failure> {
+    let (mut id, mut again): (UniqueId, UniqueId) = ([0; 16], [0; 16]);
+    i2c.write(address, &[register::PAGE_ID, 1])?;
+    i2c.write_read(address, &[register::UNIQUE_ID], &mut id)?;
+    i2c.write_read(address, &[register::UNIQUE_ID], &mut again)?;
+    i2c.write(address, &[register::PAGE_ID, 0])?;
+    let [wrote, ..] = id;
+    if let Some((_, read)) = id.iter().zip(again).find(|(a, b)| **a != *b) {
+        return Err(Failure::Sensor(Error::ReadBack {
+            register: register::UNIQUE_ID,
+            wrote,
+            read,
+        }));
+    }
+    Ok(id.iter().any(|byte| *byte != wrote).then_some(id))
 }
 
 fn check_id(id: u8) -> Result<(), Failure> {

@@ -134,6 +134,37 @@ fn pause(step: Step, micros: u64) -> Outcome {
         next: Some(step),
         pause: Duration::from_ticks(micros),
         pointer_stays: None,
+        unique_id: None,
+    }
+}
+
+/// A unique id.
+const UNIQUE: UniqueId = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3, 5, 8, 9, 7, 9, 3];
+
+#[test]
+fn a_unique_id_that_reads_otherwise_the_second_time_or_is_none_names_nobody() {
+    let a = 0x28;
+    let mut flipped = UNIQUE;
+    flipped[7] ^= 0x10;
+    let identify = |first: UniqueId, second: UniqueId| {
+        let mut bus = scripted(&[
+            page(a),
+            read(a, 0x00, 0xA0),
+            Expect::write(a, vec![0x07, 0x01]),
+            Expect::write_read(a, vec![0x50], first.to_vec()),
+            Expect::write_read(a, vec![0x50], second.to_vec()),
+            page(a),
+        ]);
+        let outcome = run(Step::Identify, a, &mut bus);
+        bus.release().done();
+        outcome
+    };
+    assert!(matches!(
+        identify(UNIQUE, flipped),
+        Err(Error::ReadBack { register: 0x50, .. })
+    ));
+    for none in [[0; 16], [0xFF; 16]] {
+        assert_eq!(identify(none, none).unwrap().unique_id, None);
     }
 }
 
@@ -141,9 +172,14 @@ fn pause(step: Step, micros: u64) -> Outcome {
 fn bring_up_makes_exactly_these_transactions() {
     let a = 0x28;
     let mut script = vec![
-        // Identify: chip id first, then CONFIG, because a running sensor does not take a reset.
+        // Identify: chip id, and the unique id twice from page 1.
         page(a),
         read(a, 0x00, 0xA0),
+        Expect::write(a, vec![0x07, 0x01]),
+        Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
+        Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
+        page(a),
+        // Stop: CONFIG, because a running sensor does not take a reset.
         page(a),
         read(a, 0x3D, 0x0C),
         page(a),
@@ -161,10 +197,12 @@ fn bring_up_makes_exactly_these_transactions() {
     ]);
     script.push(Expect::read(a, vec![5, 0]));
     let mut bus = scripted(&script);
-    assert_eq!(
-        run(Step::Identify, a, &mut bus),
-        Ok(pause(Step::Reset, 20_000))
-    );
+    let identified = Outcome {
+        unique_id: Some(UNIQUE),
+        ..pause(Step::Stop, 0)
+    };
+    assert_eq!(run(Step::Identify, a, &mut bus), Ok(identified));
+    assert_eq!(run(Step::Stop, a, &mut bus), Ok(pause(Step::Reset, 20_000)));
     assert_eq!(
         run(Step::Reset, a, &mut bus),
         Ok(pause(Step::Configure, 650_000))
@@ -177,6 +215,7 @@ fn bring_up_makes_exactly_these_transactions() {
         next: None,
         pause: Duration::from_ticks(0),
         pointer_stays: Some(true),
+        unique_id: None,
     };
     assert_eq!(run(Step::Verify, a, &mut bus), Ok(up));
     bus.release().done();

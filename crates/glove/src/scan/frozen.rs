@@ -127,23 +127,25 @@ impl Detector {
         self.count_turns(sensors);
         let mut frozen = 0;
         for (k, sensor) in sensors.iter().enumerate() {
+            let Some(track) = self.tracks.get_mut(k) else {
+                break;
+            };
             if !sensor.is_running() {
-                self.tracks[k].raw = None;
-                self.tracks[k].lively = Lively::default();
+                (track.raw, track.lively) = (None, Lively::default());
                 continue;
             }
             // Bytes that are no orientation, or did not come, say nothing.
             let Some(raw) = sensor.raw.filter(|raw| imu::orientation(raw).is_ok()) else {
                 continue;
             };
-            if self.tracks[k].raw != Some(raw) {
+            if track.raw != Some(raw) {
                 self.changed(k, raw, sensors, now);
                 continue;
             }
-            self.tracks[k].unchanged = self.tracks[k].unchanged.saturating_add(1);
-            self.tracks[k].lively.rest();
+            track.unchanged = track.unchanged.saturating_add(1);
+            track.lively.rest();
             if sensor.health.is_good()
-                && since(now, self.tracks[k].since) >= timing::FROZEN_AFTER
+                && since(now, track.since) >= timing::FROZEN_AFTER
                 && (self.must_have_turned(k, sensors) || self.stopped_flickering(k))
             {
                 frozen |= 1 << k;
@@ -190,7 +192,9 @@ impl Detector {
         sensors: &[Sensor; SEGMENT_COUNT],
         now: Instant,
     ) {
-        let track = &mut self.tracks[k];
+        let Some(track) = self.tracks.get_mut(k) else {
+            return;
+        };
         if since(now, track.since) >= timing::STANDSTILL {
             // It can stand still to the bit: its flicker is to be seen anew.
             track.lively = Lively::default();
@@ -200,17 +204,24 @@ impl Detector {
         (track.raw, track.since, track.turns) = (Some(raw), now, self.turns);
         track.unchanged = 0;
         match hand::parent(k) {
-            Some(parent) => track.parent = sensors[parent].sample().orientation,
+            Some(parent) => {
+                if let Some(parent) = sensors.get(parent) {
+                    track.parent = parent.sample().orientation;
+                }
+            }
             None => self.on_hand = ON_HAND.map(|s| sensors[s].sample().orientation),
         }
     }
 
     fn must_have_turned(&self, k: usize, sensors: &[Sensor; SEGMENT_COUNT]) -> bool {
-        let good = |s: usize| sensors[s].health.is_good();
+        let good = |s: usize| sensors.get(s).is_some_and(|sensor| sensor.health.is_good());
         match hand::parent(k) {
             Some(parent) => {
-                let now = sensors[parent].sample().orientation;
-                good(parent) && imu::angle_between(&self.tracks[k].parent, &now) >= TURNED
+                let (Some(track), Some(sensor)) = (self.tracks.get(k), sensors.get(parent)) else {
+                    return false;
+                };
+                let now = sensor.sample().orientation;
+                sensor.health.is_good() && imu::angle_between(&track.parent, &now) >= TURNED
             }
             None => ON_HAND.into_iter().all(good) && self.hand_turned(sensors),
         }
@@ -224,7 +235,9 @@ impl Detector {
     }
 
     fn stopped_flickering(&self, k: usize) -> bool {
-        let track = &self.tracks[k];
+        let Some(track) = self.tracks.get(k) else {
+            return false;
+        };
         track.lively.known && self.turns.wrapping_sub(track.turns) >= TURNS
     }
 }

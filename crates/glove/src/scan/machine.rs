@@ -272,6 +272,12 @@ impl<B: Bus> BusScanner<B> {
         match active.bring_up.next() {
             Next::Transaction(transaction) => self.start_step(k, transaction, now),
             Next::Done(outcome) => {
+                if let Some(id) = outcome.unique_id
+                    && let Err(error) = self.recognise(k, id, now)
+                {
+                    self.fail_step(error, now);
+                    return false;
+                }
                 self.step = None;
                 if let Some(sensor) = self.sensors.get_mut(k)
                     && sensor.step_done(step, outcome, now)

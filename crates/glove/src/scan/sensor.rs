@@ -248,6 +248,11 @@ impl Sensor {
         }
     }
 
+    /// It may not be the sensor it was taken for: it starts over.
+    pub fn doubt(&mut self, error: Error, now: Instant) {
+        self.restart(error, now);
+    }
+
     /// Starts over, at once the first time, later and later after that.
     fn restart(&mut self, error: Error, now: Instant) {
         self.health = match error {
@@ -307,7 +312,7 @@ impl Sensor {
         }
         self.tries = self.tries.saturating_add(1);
         let limit = match (step, error) {
-            (_, Error::ChipId(_)) => 1,
+            (_, Error::ChipId(_) | Error::SameSensor { .. } | Error::OtherSensor) => 1,
             (Step::Identify, _) if self.tried => 1,
             (Step::Identify, _) => timing::FIRST_TRIES,
             _ => timing::STEP_TRIES,

@@ -41,7 +41,8 @@ impl<B> BusScanner<B> {
         }
     }
 
-    fn tell(&mut self, finding: Finding) {
+    /// Keeps a finding for whoever asks.
+    pub(super) fn tell(&mut self, finding: Finding) {
         if self.findings.len() == FINDINGS_MAX {
             self.findings.pop_front();
             self.counters.findings_lost = self.counters.findings_lost.wrapping_add(1);

@@ -19,6 +19,12 @@ pub struct Counters {
 
 /// Faults and truth. Sensors are numbered as the segments, 0 to 15; another number does nothing.
 impl VirtualGlove {
+    /// Puts the sensor that was built as number `built_as` in place of sensor `index`: its unique id is another. The sensor that
+    /// was there has its own number.
+    pub fn exchange_sensor(&self, index: usize, built_as: usize) {
+        self.sensor(index, |chip| chip.exchange(built_as));
+    }
+
     /// Takes sensor `index` off the bus (every access is a NACK), or puts it back as it was.
     pub fn unplug(&self, index: usize, unplugged: bool) {
         self.sensor(index, |chip| chip.faults.unplugged = unplugged);

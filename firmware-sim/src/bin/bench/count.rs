@@ -13,7 +13,7 @@ use bridge::hae::image::Verifier;
 use bridge::posture::Posture;
 use bridge::protocol::Outcome;
 use bridge::supervisor::{Hand, Inputs, Supervisor, Weights};
-use bridge::{Config, Instant, Platform, State, glove};
+use bridge::{Clutch, Config, Instant, Platform, State, glove};
 use core::cell::Cell;
 use core::fmt::Write;
 use core::hint::black_box;
@@ -140,7 +140,10 @@ fn supervisor() -> Most {
         let now = Instant::from_ticks(u64::from(step) * 10_000);
         let position = [(step / 8) as u8; AXES];
         let inputs = Inputs {
-            heartbeat: Some(now),
+            clutch: Clutch::Closed {
+                epoch: 1,
+                beat: now,
+            },
             hand: Some(Hand {
                 sequence: step,
                 stamp: now,
@@ -247,7 +250,7 @@ fn scanned(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 2]> {
     let mut scanner = scanner(&tape);
     let mut posture = Posture::new(
         glove::hand::Side::Right,
-        glove::hand::Calibration::identity(),
+        Some(glove::hand::Calibration::identity()),
     );
     let [mut sample, mut angles] = [Most::default(); 2];
     while !tape.is_over() {

@@ -105,8 +105,8 @@ pub struct Target {
     /// its manual does not name. A command for another family moves the fingers elsewhere.
     #[arg(long)]
     pub trust_model: bool,
-    /// Its Modbus unit (slave id), if not 9 on a serial line or 2 over TCP.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=247))]
+    /// Its Modbus unit (slave id), if not 9 on a serial line (1 to 247) or 2 over TCP (0 to 255).
+    #[arg(long, value_name = "N")]
     pub unit: Option<u8>,
     /// Speed of the serial line, if not 115200; a network has none.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]

@@ -64,7 +64,7 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     save(&model, options)?;
     let measured = task
         .measure(&mut model, interrupt)
-        .map_err(|error| unmeasured(options, &error))?;
+        .map_err(|_| unmeasured(options))?;
     // The whole file with its measures; the one without is there whatever becomes of it.
     model.save(&options.out).map_err(told)?;
     let is_hand = options.poses.is_some();
@@ -129,17 +129,23 @@ fn save(model: &Model, options: &Train) -> Result<()> {
 }
 
 /// The end was asked for while the map was measured: the model is there.
-fn unmeasured(options: &Train, error: &anyhow::Error) -> anyhow::Error {
+fn unmeasured(options: &Train) -> anyhow::Error {
     let out = options.out.display();
-    let next = match &options.poses {
-        Some(poses) => format!("gauntlet eval --model {out} --poses {}", poses.display()),
-        None => format!("gauntlet eval --model {out} with --input and --target"),
+    let what = format!(
+        "interrupted while the map was measured: the model is whole in {out}, without its measures"
+    );
+    let next = match (&options.poses, &options.input, &options.target) {
+        (None, Some(input), Some(target)) => format!(
+            "gauntlet eval --model {out} --input {} --target {}",
+            input.display(),
+            target.display()
+        ),
+        (poses, ..) => format!(
+            "gauntlet eval --model {out} --poses {}",
+            poses.as_deref().unwrap_or(Path::new("FILE.csv")).display()
+        ),
     };
-    Failure::new(
-        format!("{error}; the model is whole in {out}, without its measures"),
-        next,
-    )
-    .into()
+    Failure::new(what, next).into()
 }
 
 /// Why a hand's map is not worth driving with, and what helps.
@@ -176,14 +182,16 @@ fn check_outputs(options: &Train) -> Result<()> {
     let resume = options.resume.as_deref();
     let all: Vec<&Path> = inputs.iter().copied().chain(resume).collect();
     outputs::check(&options.out, Kind::Model, &all)?;
-    if let Some(path) = options.checkpoint.as_deref().or(resume) {
-        let mut inputs = inputs;
-        inputs.push(&options.out);
-        if options.checkpoint.is_some() || path.exists() {
-            outputs::check(path, Kind::Checkpoint, &inputs)?;
+    match (options.checkpoint.as_deref(), resume) {
+        (Some(path), _) => {
+            let mut inputs = inputs;
+            inputs.push(&options.out);
+            outputs::check(path, Kind::Checkpoint, &inputs)
         }
+        // Whether it is a checkpoint is seen when it is read.
+        (None, Some(path)) if path.is_file() => outputs::room(path),
+        (None, _) => Ok(()),
     }
-    Ok(())
 }
 
 fn hand_pairs(options: &Train) -> hand::HandPairs<'_> {

@@ -26,6 +26,8 @@ pub enum Came {
     Cut(String),
     /// What came is no Modbus TCP frame.
     Malformed(String),
+    /// The answer to an earlier question.
+    Late,
     /// A valid frame that answers something else.
     Other(String),
 }
@@ -47,6 +49,9 @@ impl Came {
             Self::Closed => "the other side closed the connection".to_owned(),
             Self::Cut(what) => format!("only a part of an answer came: {what}"),
             Self::Malformed(what) => format!("what came is no valid Modbus TCP frame: {what}"),
+            Self::Late => {
+                "answers come late: more than a second after the question, when the next one is asked".to_owned()
+            }
             Self::Other(what) => format!("a valid frame does not answer the question: {what}"),
         }
     }

@@ -97,8 +97,7 @@ impl Wire {
             rest,
         } = judge(function, &heard, self.ended);
         let came = if came.is_answer() && self.was_asked_before(number) {
-            let what = "it is that of an earlier question, more than a second late";
-            Came::Other(what.to_owned())
+            Came::Late
         } else {
             came
         };

@@ -23,6 +23,7 @@ pub struct Chip {
     pub fusion_from: u64,
     /// Its register pointer runs on after a read.
     pub runs_on: bool,
+    pub unique_id: [u8; 16],
 }
 
 /// The bus, the multiplexer and 16 chips; a batch takes 1 ms, a read that fails 30 ms, as behind the serial bridge.
@@ -38,7 +39,7 @@ pub struct Fake {
 
 impl Fake {
     pub fn new(pose: impl FnMut(u64, usize) -> Quaternion + 'static) -> Self {
-        let chip = |_| Chip {
+        let chip = |k: u8| Chip {
             mode: 0x0C,
             pointer: 0,
             boot_until: 0,
@@ -49,6 +50,7 @@ impl Fake {
             frozen: None,
             fusion_from: 0,
             runs_on: false,
+            unique_id: core::array::from_fn(|i| k + 1 + 7 * i as u8),
         };
         Self {
             chips: (0..16).map(chip).collect(),
@@ -138,6 +140,7 @@ impl Chip {
             0x3B => vec![self.units; count],
             0x3D => vec![self.mode],
             0x3E => vec![0],
+            0x50 => self.unique_id[..count].to_vec(),
             other => panic!("register {other:#04X} read"),
         }
     }

@@ -104,7 +104,20 @@ fn bring_up_of_all() -> Vec<Expect> {
     let page = |a| Expect::write(a, vec![7, 0]);
     let read = |a, r, v: u8| Expect::write_read(a, vec![r], vec![v]);
     let write = |a, r, v| Expect::write(a, vec![r, v]);
-    step(&|a| vec![page(a), read(a, 0, 0xA0), page(a), read(a, 0x3D, 0)]);
+    // All ids the same byte, as no sensor has them: they are not judged.
+    let unique = |a| Expect::write_read(a, vec![0x50], vec![0; 16]);
+    step(&|a| {
+        let page_1 = Expect::write(a, vec![7, 1]);
+        vec![
+            page(a),
+            read(a, 0, 0xA0),
+            page_1,
+            unique(a),
+            unique(a),
+            page(a),
+        ]
+    });
+    step(&|a| vec![page(a), read(a, 0x3D, 0)]);
     step(&|a| vec![page(a), write(a, 0x3F, 0x20)]);
     step(&|a| {
         let mut lines = vec![
