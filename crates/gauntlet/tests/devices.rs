@@ -63,6 +63,7 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
         &simulation.glove(),
         &simulation.gripper(),
         &[
+            "--calibrate-flat",
             "--engage",
             "--activate",
             "--seconds",
@@ -119,7 +120,7 @@ fn driving(simulation: &Simulation, word: &str, log: &str) -> (Child, JoinHandle
     let arguments = teleop(
         &simulation.glove(),
         &simulation.gripper(),
-        &["--engage", "--activate", "--log", log],
+        &["--calibrate-flat", "--engage", "--activate", "--log", log],
     );
     let mut child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
         .stdout(Stdio::piped())
