@@ -55,6 +55,18 @@ fn run(board: Board) {
         mut stack,
         started,
     } = board;
+    let mut app = bridge(time, glove, gripper, slots);
+    let mut server = Server::new(host);
+    watchdog.start();
+    while turn(&mut app, &mut server, &mut watchdog, &mut stack, started) == Outcome::Continue {}
+    board::restart()
+}
+
+/// The bridge on its devices.
+///
+/// A function of its own, so that what it is made of does not stay on the stack beside it.
+#[inline(never)]
+fn bridge(time: SystemTime, glove: Port, gripper: Port, slots: [PsramSlot; 2]) -> Bridge {
     let store = WeightsStore::new(slots, bridge::app::expected(AXES));
     let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
     let config = gripper::driver::Config {
@@ -62,11 +74,7 @@ fn run(board: Board) {
         ..gripper::driver::Config::default()
     };
     let gripper = ThreeFinger::new(gripper, config);
-    let mut app: Bridge = App::new(Machine { time }, scanner, gripper, store, Config::default());
-    let mut server = Server::new(host);
-    watchdog.start();
-    while turn(&mut app, &mut server, &mut watchdog, &mut stack, started) == Outcome::Continue {}
-    board::restart()
+    App::new(Machine { time }, scanner, gripper, store, Config::default())
 }
 
 /// One turn of the loop: the bridge, the host, then sleep until something is due.

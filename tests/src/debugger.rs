@@ -35,9 +35,67 @@ pub fn patch_tick(port: &Path, instruction: u16) {
     assert_eq!(ask(&mut line, "D"), "OK");
 }
 
-fn ask(line: &mut UnixStream, text: &str) -> String {
+/// A machine whose loop was made to stand still.
+#[derive(Debug)]
+pub struct Hung {
+    address: u32,
+    was: String,
+}
+
+/// Makes the machine's loop stand still where it is just now; its interrupts go on. The watchdog resets it a second later,
+/// unless [`resume`] comes before.
+///
+/// # Panics
+/// The debugger port does not do what it is asked.
+pub fn hang(port: &Path) -> Hung {
+    let mut line = UnixStream::connect(port).expect("the debugger port");
+    line.set_read_timeout(Some(PATIENCE)).expect("a socket");
+    let stand = format!("{:04x}", JUMP_TO_ITSELF.swap_bytes());
+    // Out of whatever it sleeps in with its interrupts masked, and out of any handler.
+    for step in 0.. {
+        assert!(step < 100_000, "the loop does not come by");
+        tell(&mut line, "s");
+        while !packet(&mut line).starts_with('T') {}
+        if step < 500 {
+            continue;
+        }
+        let registers = ask(&mut line, "g");
+        let register = |index: usize| {
+            let word = registers.get(8 * index..8 * index + 8).expect("a register");
+            u32::from_str_radix(word, 16)
+                .expect("hexadecimal digits")
+                .swap_bytes()
+        };
+        let (address, state) = (register(15), register(16));
+        if state & 0x1FF == 0 {
+            let was = ask(&mut line, &format!("m{address:x},2"));
+            assert_eq!(ask(&mut line, &format!("M{address:x},2:{stand}")), "OK");
+            assert_eq!(ask(&mut line, "D"), "OK");
+            return Hung { address, was };
+        }
+    }
+    unreachable!("the assertion above ends it")
+}
+
+/// Lets a loop go on that [`hang`] made stand still.
+///
+/// # Panics
+/// The debugger port does not do what it is asked.
+pub fn resume(port: &Path, hung: &Hung) {
+    let mut line = UnixStream::connect(port).expect("the debugger port");
+    line.set_read_timeout(Some(PATIENCE)).expect("a socket");
+    let Hung { address, was } = hung;
+    assert_eq!(ask(&mut line, &format!("M{address:x},2:{was}")), "OK");
+    assert_eq!(ask(&mut line, "D"), "OK");
+}
+
+fn tell(line: &mut UnixStream, text: &str) {
     let sum = text.bytes().fold(0u8, u8::wrapping_add);
     write!(line, "${text}#{sum:02x}").expect("the debugger port");
+}
+
+fn ask(line: &mut UnixStream, text: &str) -> String {
+    tell(line, text);
     loop {
         let answer = packet(line);
         // Where the machine stopped when the debugger came is told unasked.

@@ -20,6 +20,7 @@ use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::pty::{Handle, PtyDevice};
 
+use crate::debugger;
 use crate::images::index_finger;
 use crate::random;
 
@@ -252,28 +253,25 @@ fn spawn(device: Box<dyn Device>) -> Handle {
     handle.expect("a terminal")
 }
 
-/// Sends `bytes` bytes to a bridge whose host has stopped reading: the bridge's answers fill its transmit queue, it takes no
-/// more requests, and its receive queue fills. The bytes lost by the host's, the glove's and the gripper's port, once the
-/// host reads again.
+/// Sends `bytes` bytes to a bridge whose loop stands still for a moment: its receive queue fills. The bytes lost by the
+/// host's, the glove's and the gripper's port, once the loop goes on.
 ///
 /// # Panics
 /// The bridge does not answer then.
 pub fn flood(firmware: &Path, bytes: usize) -> [u32; 3] {
-    let mut emulator = bare(firmware);
-    let mut link = emulator.link().expect("a bridge");
+    let mut emulator = debugged(firmware);
+    drop(emulator.link().expect("a bridge"));
     let Address::Unix(path) = emulator.address() else {
         panic!("an emulator's address is a socket")
     };
-    // Samples go on for 2 s after the host's last word. Nobody reads them: the emulator's socket holds some hundred single
-    // bytes, the queue 1,024.
-    link.telemetry(20).expect("taken");
-    drop(link);
     let mut line = UnixStream::connect(path).expect("the emulator's socket");
-    std::thread::sleep(Duration::from_secs(1));
+    let hung = debugger::hang(&emulator.debugger());
     // No zero among them: together they are the start of one frame that is too long.
     line.write_all(&vec![0x55; bytes])
         .expect("room in the socket");
-    std::thread::sleep(Duration::from_secs(3));
+    // A byte takes the emulator some 80 µs; the watchdog waits for a second.
+    std::thread::sleep(Duration::from_millis(400));
+    debugger::resume(&emulator.debugger(), &hung);
     drop(line);
     let mut link = emulator.link().expect("the bridge answers the next host");
     link.counters().expect("an answer").bytes_lost

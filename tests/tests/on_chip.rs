@@ -4,7 +4,7 @@
 
 use std::time::{Duration, Instant};
 
-use bridge::protocol::message::{Answer, Call, Refusal};
+use bridge::protocol::message::{Answer, Call, Refusal, Restart};
 use bridge::{HoldReason, State};
 use gauntlet::failure::Failure;
 use gauntlet::host_link::{Error, HostLink};
@@ -66,7 +66,7 @@ fn bytes_that_find_the_queue_full_are_counted_and_the_bridge_goes_on() {
     let sent = 6_000;
     let [host, glove, gripper] = flood(&firmware, sent);
     println!("{sent} bytes to a bridge that takes none: {host} lost");
-    // The queue holds 2,048. A machine with much to do may not have delivered all when the host reads again; on one with
+    // The queue holds 2,048. A machine with much to do may not have delivered all when the loop goes on; on one with
     // little to do the next host's first words still find the queue full.
     let greeting = 64;
     assert!(
@@ -84,7 +84,10 @@ fn a_loop_that_hangs_or_faults_starts_again_with_its_weights_and_an_open_clutch(
     let mut link = emulator.link().expect("a bridge");
     flash(&mut link, &index_finger(4)).expect("weights");
     // The first is for the watchdog, the second for the fault handler.
-    for instruction in [debugger::JUMP_TO_ITSELF, debugger::UNDEFINED] {
+    for (instruction, cause) in [
+        (debugger::JUMP_TO_ITSELF, Restart::Watchdog),
+        (debugger::UNDEFINED, Restart::Software),
+    ] {
         hold_clutch(&mut link, Duration::from_millis(300));
         let before = link.status().expect("an answer").now_us;
         drop(link);
@@ -93,6 +96,9 @@ fn a_loop_that_hangs_or_faults_starts_again_with_its_weights_and_an_open_clutch(
         println!("{instruction:04x}: started again");
         assert_eq!(active(&mut link), Some(4));
         assert!(!link.status().expect("an answer").engaged);
+        let health = link.health().expect("an answer");
+        assert_eq!(health.restart, cause);
+        assert!(!health.calibration.is_calibrated);
     }
 }
 

@@ -90,9 +90,9 @@ fn a_multiplexer_that_ignores_selections_is_named_before_the_gripper_went_far() 
     let before = bench.gripper.positions();
     bench.glove.stick_mux(Some(0));
     bench.run(3 * S);
-    // Bits that are the same once may be chance: it takes some scans, as does the blend of what came before.
+    // Bits that are the same once may be chance: it takes some scans.
     println!("moved by {} counts", moved(&bench, before));
-    assert!(moved(&bench, before) <= 25.0, "{}", moved(&bench, before));
+    assert!(moved(&bench, before) <= 40.0, "{}", moved(&bench, before));
     assert!(!bench.state().is_moving());
     assert!(found(&bench, |finding| matches!(
         finding,

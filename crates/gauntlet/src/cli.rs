@@ -75,8 +75,8 @@ Examples:
   gauntlet demo --seconds 60 --json > result.json
   gauntlet demo --on-chip
 
-The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians
-(thumb_cmc_flex, thumb_cmc_abd, … little_dip_flex; docs/tool.md lists them).
+The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians \
+(thumb_cmc_flex, thumb_cmc_abd, … little_dip_flex; docs/tool.md lists them). \
 Keys while it runs on a terminal: space opens and closes the clutch, q holds the gripper and ends.")]
 pub struct Demo {
     /// Train on and play this recording of a hand instead of generated motion.
@@ -131,10 +131,10 @@ Examples:
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
   gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors   (in another terminal)
 
-Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real
-ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0
-takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too.
-The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves.
+Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
+ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
+takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
+The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -200,8 +200,8 @@ Examples:
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
   gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --engage --activate --seconds 10
 
-Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it,
-`--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or
+Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
+`--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \
 by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
 pub struct Teleop {
     /// The glove's serial port.
@@ -251,8 +251,8 @@ Examples:
   gauntlet flash weights.hae --bridge tcp:localhost:4000
   gauntlet flash model.safetensors --int16 my_hand.csv --bridge /dev/ttyUSB0
 
-The bridge keeps its old weights until the new image is there, whole and checked: power may go at any moment.
-A broken line is waited for and opened again; the transfer goes on where the bridge says it was. At the end
+The bridge keeps its old weights until the new image is there, whole and checked: power may go at any moment. \
+A broken line is waited for and opened again; the transfer goes on where the bridge says it was. At the end \
 the bridge reads its flash and the CRC is compared. Refused while the clutch is closed.")]
 pub struct Flash {
     /// A trained model (MODEL.safetensors) or a weights image.

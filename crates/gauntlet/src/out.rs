@@ -65,7 +65,7 @@ pub fn check() -> Result<()> {
     let whole = drain(&STDOUT);
     let next = "a place with room";
     match STDOUT.fault() {
-        Some((kind, _)) if kind == ErrorKind::BrokenPipe => Ok(()),
+        Some((ErrorKind::BrokenPipe, _)) => Ok(()),
         // The terminal was closed: nobody is there to be told.
         Some((_, Some(code))) if code == rustix::io::Errno::IO.raw_os_error() => Ok(()),
         Some((kind, code)) => {

@@ -1,6 +1,7 @@
 //! Files the tool writes: never over an input, never over something else than a file of their own kind.
 
 use std::io::Read;
+use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
@@ -127,6 +128,9 @@ pub fn check(path: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
     let refuse = |why: &str| Err(refusal(path, why));
     if !folder_of(path).is_dir() {
         return refuse("its folder does not exist");
+    }
+    if path.as_os_str().as_bytes().ends_with(b"/") {
+        return refuse("it names a folder");
     }
     if inputs.iter().any(|input| is_same(path, input)) {
         return refuse("it is an input of this very command");
@@ -257,6 +261,8 @@ mod tests {
     fn what_cannot_be_written_is_told_before_the_work_and_nothing_is_left() {
         let folder = tempfile::tempdir().unwrap();
         let long = folder.path().join("n".repeat(250));
+        let open = folder.path().join("new/");
+        assert!(said(&open, Kind::Model, &[]).contains("names a folder"));
         for kind in [Kind::Model, Kind::Checkpoint, Kind::Image] {
             assert!(said(&long, kind, &[]).contains("is not written"));
             // A folder in which nobody may write, root neither.

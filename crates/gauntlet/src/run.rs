@@ -1,6 +1,7 @@
 //! A run of the bridge as a person sees it: heartbeat, keys, live view, log and numbers, until its time is over.
 
 pub mod calibrating;
+mod clutch;
 mod ending;
 mod numbers;
 mod replies;
@@ -34,8 +35,6 @@ pub use summary::Summary;
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
 const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
-/// After this long the bridge has seen that the clutch was closed.
-const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
 /// Records of the bring-up that wait for the log, which is made after it: some 30 s.
 const EARLY: usize = 8192;
 /// By then whoever wrote beyond a file's limit was told.
@@ -220,7 +219,7 @@ impl Run {
             self.engage();
         }
         let started = Instant::now();
-        self.numbers.begin();
+        self.numbers.begin(self.clock.now());
         let mut last_round = started;
         loop {
             // Nobody sees the view: as if nobody were there.
@@ -330,32 +329,6 @@ impl Run {
             }
             Key::Open => self.release(),
             Key::Calibrate => self.order(Order::Calibrate(glove::timing::STILL_WAIT)),
-        }
-    }
-
-    /// Closes the clutch: an act of a person.
-    fn engage(&mut self) {
-        let now = Instant::now();
-        (self.clutch, self.expired) = (true, false);
-        (self.engaged, self.heartbeat) = (Some(now), Some(now));
-        self.order(Order::Engage);
-    }
-
-    /// Opens the clutch, for a person.
-    fn release(&mut self) {
-        (self.clutch, self.expired) = (false, false);
-        self.order(Order::Release);
-    }
-
-    /// Sees that the clutch opened by itself.
-    fn look_at_clutch(&mut self) {
-        let settled = self.engaged.is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
-        let open = self
-            .session
-            .snapshot()
-            .is_some_and(|seen| matches!(seen.clutch, Position::Open | Position::Expired));
-        if self.clutch && settled && open {
-            (self.clutch, self.expired) = (false, true);
         }
     }
 

@@ -21,7 +21,7 @@ fn the_demo_trains_and_moves_the_gripper() {
     let quality = &said["quality"];
     assert!(quality["volume_occupancy"].as_f64() >= Some(0.90), "{said}");
     assert!(quality["d_knn"].as_f64() <= Some(16.0), "{said}");
-    assert!(said["first_motion_s"].as_f64().is_some(), "{said}");
+    assert!(said["run"]["first_motion_s"].as_f64().is_some(), "{said}");
     assert!(said["run"]["frames_answered"].as_u64() > Some(0), "{said}");
     assert_eq!(said["pairs"], 10);
     let bytes = std::fs::read(&log).unwrap();

@@ -29,7 +29,7 @@ fn moving(family: Family) -> (VirtualGripper, rig::pty::Handle, Child, String) {
         "250",
         "--speed",
         "60",
-        "--gripper-model",
+        "--model",
         model,
     ]);
     let end = Instant::now() + Duration::from_secs(30);
@@ -199,35 +199,69 @@ fn signal(child: &Child, signal: Signal) {
     .unwrap();
 }
 
+/// Stops the process for `stall` ms, moves the gripper meanwhile, and looks at the first command after it.
+fn stalls(gripper: &VirtualGripper, clock: &rig::Clock, child: Child, stall: u64) {
+    signal(&child, Signal::STOP);
+    std::thread::sleep(Duration::from_millis(stall));
+    // Meanwhile somebody else has moved it.
+    gripper.run_until(clock.now());
+    for axis in 0..3 {
+        gripper.set_position(axis, 160.0);
+    }
+    // Its registers show that from the next refresh on.
+    std::thread::sleep(Duration::from_millis(10));
+    gripper.run_until(clock.now());
+    // What a stopped program wrote last has arrived, and was answered, before it goes on.
+    let (block, writes) = (gripper.command_block(), gripper.writes());
+    signal(&child, Signal::CONT);
+    let end = Instant::now() + Duration::from_secs(5);
+    while gripper.writes() == writes && Instant::now() < end {
+        std::thread::yield_now();
+    }
+    let first = gripper.command_block();
+    println!(
+        "{stall} ms: told {} before and {} after",
+        block[3], first[3]
+    );
+    // It stands at 160 or a little below: what it was told before pulls it back meanwhile.
+    let here = gripper.positions()[0];
+    assert!(f32::from(first[3]) >= here - 1.0, "{first:?} at {here}");
+    let output = finish(child);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+}
+
 #[test]
 fn a_process_that_stood_still_asks_where_the_gripper_is_before_it_commands() {
     for stall in [150, 400, 1_500] {
         let (gripper, handle, child, _) = moving(Family::ThreeFinger);
-        signal(&child, Signal::STOP);
-        std::thread::sleep(Duration::from_millis(stall));
-        // Meanwhile somebody else has moved it.
-        gripper.run_until(handle.clock().now());
-        for axis in 0..3 {
-            gripper.set_position(axis, 160.0);
+        stalls(&gripper, handle.clock(), child, stall);
+    }
+}
+
+#[test]
+fn a_process_that_stood_still_does_so_on_the_network_too() {
+    for stall in [150, 230, 1_500] {
+        let gripper = VirtualGripper::new(Config::default());
+        let clock = rig::Clock::system();
+        let server = rig::gripper::tcp::serve(&gripper, "127.0.0.1:0", &clock).unwrap();
+        gripper.preset_active();
+        let place = format!("tcp:{}", server.address());
+        let child = start(&[
+            "gripper",
+            "move",
+            "--gripper",
+            &place,
+            "--to",
+            "250",
+            "--speed",
+            "60",
+        ]);
+        let end = Instant::now() + Duration::from_secs(30);
+        while gripper.positions()[0] < 50.0 {
+            assert!(Instant::now() < end, "it never moved");
+            std::thread::sleep(Duration::from_millis(2));
         }
-        // What a stopped program wrote last arrives, and is answered, before it goes on.
-        let (block, writes) = (gripper.command_block(), gripper.writes());
-        signal(&child, Signal::CONT);
-        let end = Instant::now() + Duration::from_secs(5);
-        while gripper.writes() == writes && Instant::now() < end {
-            std::thread::yield_now();
-        }
-        let first = gripper.command_block();
-        println!(
-            "{stall} ms: told {:?} before and {:?} after",
-            &block[3..4],
-            &first[3..4]
-        );
-        // It stands at 160 or a little below: what it was told before pulls it back meanwhile.
-        let here = gripper.positions()[0];
-        assert!(f32::from(first[3]) >= here - 1.0, "{first:?} at {here}");
-        let output = finish(child);
-        assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+        stalls(&gripper, &clock, child, stall);
     }
 }
 
@@ -294,4 +328,15 @@ fn a_speed_for_a_network_is_refused_and_the_gripper_s_name_has_two_spellings() {
         "{}",
         text(&output.stderr)
     );
+}
+
+#[test]
+fn a_watch_whose_gripper_no_longer_answers_ends_with_a_failure() {
+    let (gripper, _handle, path) = gripper(Config::default());
+    let mut child = start(&["gripper", "watch", "--seconds", "4", "--gripper", &path]);
+    let said = support::until_line(child.stdout.take().unwrap(), "not activated");
+    gripper.mute(u32::MAX);
+    let output = child.wait_with_output().unwrap();
+    assert!(refusal(&output, 1).contains("has not answered for"));
+    assert!(said.join().unwrap().contains("no answer"));
 }

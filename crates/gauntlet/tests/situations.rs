@@ -382,7 +382,7 @@ fn answer(call: &Call<'_>, image: &mut Vec<u8>, slot: &mut SlotContents) -> Answ
     let slots = |slot: &SlotContents| {
         Answer::Slots(Slots {
             active: Some(1),
-            contents: [SlotContents::Empty, slot.clone()],
+            contents: [SlotContents::Empty, *slot],
         })
     };
     match call {

@@ -103,6 +103,8 @@ pub enum Verdict {
 #[derive(Clone, Copy, Debug)]
 pub struct Plausibility<const X: usize> {
     speed: Speed,
+    /// Nothing seen for this long starts anew.
+    restart: Duration,
     /// The newest positions that can be true; `None` before the first.
     position: Option<[u8; X]>,
     /// They have been confirmed by a second status.
@@ -118,6 +120,7 @@ impl<const X: usize> Plausibility<X> {
     pub const fn new(speed: Speed) -> Self {
         Self {
             speed,
+            restart: RESTART,
             position: None,
             confirmed: false,
             newest: None,
@@ -125,9 +128,22 @@ impl<const X: usize> Plausibility<X> {
         }
     }
 
+    /// The same on a line that is known to be slow: statuses come `longer` apart than [`RESTART`].
+    #[must_use]
+    pub const fn patient(self, longer: Duration) -> Self {
+        let restart = RESTART.as_ticks().saturating_add(longer.as_ticks());
+        Self {
+            restart: Duration::from_ticks(restart),
+            ..self
+        }
+    }
+
     /// Forgets what was seen: the next status is a first one.
     pub fn forget(&mut self) {
-        *self = Self::new(self.speed);
+        *self = Self {
+            restart: self.restart,
+            ..Self::new(self.speed)
+        };
     }
 
     /// Judges `status`, heard at `now` or before. The same status (by its stamp) may be given again
@@ -146,7 +162,7 @@ impl<const X: usize> Plausibility<X> {
             Activation::Ready | Activation::ChangingMode
         );
         let verdict = match (passed, self.position) {
-            (Some((gap, before)), Some(position)) if judged && gap <= RESTART => self.compare(
+            (Some((gap, before)), Some(position)) if judged && gap <= self.restart => self.compare(
                 status,
                 position,
                 timing::since(now.max(status.stamp), before),

@@ -6,7 +6,7 @@ use crate::data::Matrix;
 /// More samples than these are first thinned by their order: recordings of hours.
 const MOST: usize = 50_000;
 
-/// The indices of `count` samples, in ascending order; all of them when there are no more. The first is the one farthest from the mean,
+/// The indices of `count` samples, in ascending order; all of them when there are no more, fewer when the rest repeat them. The first is the one farthest from the mean,
 /// each further one the farthest from all before it; of equally far ones the first.
 #[must_use]
 pub fn spread(samples: &Matrix, count: usize) -> Vec<usize> {
@@ -30,6 +30,9 @@ pub fn spread(samples: &Matrix, count: usize) -> Vec<usize> {
             if far[place] > far[best] {
                 best = place;
             }
+        }
+        if far[best] <= 0.0 && !chosen.is_empty() {
+            break;
         }
         chosen.push(all[best]);
         newest = samples.row(all[best]).to_vec();
@@ -100,8 +103,10 @@ mod tests {
             let still = samples.row(5).to_vec();
             samples.push(&still);
         }
-        let chosen = spread(&samples, 100);
-        assert!(chosen.iter().filter(|&&index| index >= 300).count() == 0);
+        for count in [100, 1000] {
+            let chosen = spread(&samples, count);
+            assert!(chosen.iter().all(|&index| index < 300) && chosen.len() == count.min(300));
+        }
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The vector table and the exceptions.
 
-use super::{restart, time};
 use super::uart::Uart;
+use super::{restart, time};
 use cortex_m::peripheral::NVIC;
 use cortex_m_rt::{ExceptionFrame, exception};
 

@@ -9,11 +9,11 @@ mod time;
 mod uart;
 mod watchdog;
 
+use bridge::protocol::message::Restart;
 pub use flash::PsramSlot;
 pub use restart::restart;
 pub use stack::StackWatch;
 pub use time::{SystemTime, wait_for_interrupt};
-use bridge::protocol::message::Restart;
 use uart::Uart;
 pub use uart::{Port, bytes_lost};
 pub use watchdog::Watchdog;

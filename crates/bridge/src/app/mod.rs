@@ -103,7 +103,16 @@ where
         config: Config<X>,
     ) -> Self {
         let now = platform.now();
-        let mut app = Self {
+        let mut events = heapless::Deque::new();
+        if store.active().is_none() {
+            // There is room.
+            let _ = events.push_back(Event {
+                at: now,
+                kind: Kind::NoWeights,
+            });
+        }
+        // Built where it will be: a chip's stack has no room for it twice.
+        Self {
             platform,
             telemetry: Telemetry::new(now, scanner.state()),
             scanner,
@@ -123,12 +132,8 @@ where
             stands: None,
             weights: None,
             frame_at: None,
-            events: heapless::Deque::new(),
-        };
-        if app.store.active().is_none() {
-            app.tell(now, Kind::NoWeights);
+            events,
         }
-        app
     }
 
     /// Does what is due and returns when the next thing is. Never waits; at most 1 ms, whatever the devices do.
@@ -142,8 +147,10 @@ where
         self.watch(now);
         if frame.is_some() || self.due.is_none_or(|due| now >= due) {
             self.supervise(now, frame.is_some());
-            // The line may be free: then the command leaves now. What this poll finds is taken in the next step.
+            // The line may be free: then the command leaves now. What this poll finds is taken in the next step. By the clock
+            // as it is now: where the machine stood still in this very step, the command is too old to leave.
             if self.gripper.next_due() <= now {
+                let now = self.platform.now();
                 self.stashed = self.poll_and_see(now);
             }
         }

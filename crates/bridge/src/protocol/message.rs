@@ -3,8 +3,7 @@
 //! The order of enum variants and struct fields **is** the wire format (postcard writes a variant's index and fields in
 //! order): append only, and raise [`VERSION`] when anything else changes. `docs/protocol.md` fixes it.
 
-use crate::calibration::CalibrationState;
-use crate::clutch::{Epoch, HeartbeatRefusal, Position};
+use crate::clutch::{Epoch, HeartbeatRefusal};
 use crate::config::SafeAction;
 use crate::{State, filter, store};
 use glove::hand::{JOINT_COUNT, Side};
@@ -12,6 +11,12 @@ use gripper::{Activation, registers::Fault};
 use hae::image::Element;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
+
+mod counters;
+mod health;
+
+pub use counters::Counters;
+pub use health::{Health, Restart};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.
 pub const VERSION: u16 = 3;
@@ -195,33 +200,6 @@ pub struct Status {
     pub transfer: Option<(u32, u32)>,
 }
 
-/// What keeps a bridge from moving, beside its devices.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Health {
-    /// Where the clutch is.
-    pub clutch: Position,
-    /// Whether the glove is calibrated, and how the newest try ended.
-    pub calibration: CalibrationState,
-    /// Why the bridge started.
-    pub restart: Restart,
-    /// Stalls: more than 100 ms without a step of the supervisor.
-    pub stalls: u32,
-}
-
-/// Why a bridge started.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Restart {
-    /// The board cannot tell.
-    #[default]
-    Unknown,
-    /// Its power came, or its reset pin was pulled.
-    Power,
-    /// It was asked to ([`Call::Reboot`]), or a fault handler did.
-    Software,
-    /// The watchdog: the loop hung.
-    Watchdog,
-}
-
 /// What the gripper says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GripperStatus {
@@ -283,72 +261,6 @@ impl From<Element> for WeightsKind {
             Element::F32 => Self::Float32,
             Element::I16 => Self::Int16,
             _ => Self::Other,
-        }
-    }
-}
-
-/// Counts since start.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Counters {
-    /// Frames taken from the glove.
-    pub frames: u32,
-    /// Frames that the gripper was to follow.
-    pub following_frames: u32,
-    /// Of those, frames of which a command left.
-    pub answered_frames: u32,
-    /// Frames that gave no angles or were refused by the map.
-    pub unusable_frames: u32,
-    /// Commands that left.
-    pub commands: u32,
-    /// Statuses of the gripper.
-    pub statuses: u32,
-    /// Cycles of the gripper that ended in an error.
-    pub gripper_errors: u32,
-    /// Steps of the supervisor.
-    pub steps: u32,
-    /// Steps that came more than 2 ms late.
-    pub late_steps: u32,
-    /// The latest one, microseconds.
-    pub worst_late_us: u32,
-    /// How often motion was held.
-    pub holds: u32,
-    /// How often the gripper's fault ended motion.
-    pub faults: u32,
-    /// Frames of the host protocol: whole, wrong CRC, no COBS, too long.
-    pub host_frames: [u32; 4],
-    /// Messages of the host with a right CRC that were no requests.
-    pub host_malformed: u32,
-    /// Bytes that each port lost because a queue was full: host, glove, gripper.
-    pub bytes_lost: [u32; 3],
-    /// Most bytes of stack that were ever in use; 0 where nobody looks.
-    pub stack_used: u32,
-}
-
-impl Counters {
-    /// What was counted since `before`. The latest step, the lost bytes and the stack stay what they are since the start.
-    pub const fn since(&self, before: &Self) -> Self {
-        let [good, crc, coding, oversized] = self.host_frames;
-        let [good_before, crc_before, coding_before, oversized_before] = before.host_frames;
-        Self {
-            frames: self.frames.wrapping_sub(before.frames),
-            following_frames: self.following_frames.wrapping_sub(before.following_frames),
-            answered_frames: self.answered_frames.wrapping_sub(before.answered_frames),
-            unusable_frames: self.unusable_frames.wrapping_sub(before.unusable_frames),
-            commands: self.commands.wrapping_sub(before.commands),
-            statuses: self.statuses.wrapping_sub(before.statuses),
-            gripper_errors: self.gripper_errors.wrapping_sub(before.gripper_errors),
-            steps: self.steps.wrapping_sub(before.steps),
-            late_steps: self.late_steps.wrapping_sub(before.late_steps),
-            holds: self.holds.wrapping_sub(before.holds),
-            faults: self.faults.wrapping_sub(before.faults),
-            host_frames: [
-                good.wrapping_sub(good_before),
-                crc.wrapping_sub(crc_before),
-                coding.wrapping_sub(coding_before),
-                oversized.wrapping_sub(oversized_before),
-            ],
-            host_malformed: self.host_malformed.wrapping_sub(before.host_malformed),
-            ..*self
         }
     }
 }
@@ -451,48 +363,3 @@ pub const SETTING_NAMES: [&str; 8] = [
     "lead",
     "open_rate",
 ];
-
-#[cfg(test)]
-mod tests {
-    use super::Counters;
-
-    #[test]
-    fn counters_since_are_what_was_added_and_the_extremes_stay() {
-        let before = Counters {
-            frames: u32::MAX,
-            holds: 3,
-            host_frames: [10, 1, 2, 3],
-            host_malformed: 4,
-            bytes_lost: [1, 2, 3],
-            worst_late_us: 500,
-            stack_used: 1_000,
-            ..Counters::default()
-        };
-        let after = Counters {
-            frames: 4,
-            following_frames: 3,
-            answered_frames: 2,
-            unusable_frames: 1,
-            commands: 9,
-            statuses: 8,
-            gripper_errors: 7,
-            steps: 6,
-            late_steps: 5,
-            holds: 5,
-            faults: 1,
-            host_frames: [15, 2, 4, 6],
-            host_malformed: 8,
-            bytes_lost: [1, 5, 3],
-            worst_late_us: 600,
-            stack_used: 1_200,
-        };
-        let since = Counters {
-            frames: 5,
-            holds: 2,
-            host_frames: [5, 1, 2, 3],
-            host_malformed: 4,
-            ..after
-        };
-        assert_eq!(after.since(&before), since);
-    }
-}

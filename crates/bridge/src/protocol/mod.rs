@@ -5,9 +5,11 @@
 
 mod configuration;
 pub mod frame;
+mod incoming;
 pub mod message;
 mod outgoing;
 mod server;
 mod slow;
+mod telling;
 
 pub use server::{Board, Outcome, Server};

@@ -1,17 +1,16 @@
 //! The bridge's end of the host protocol: takes requests from a port, has [`App`] do them, answers.
 
-use super::configuration::{self, per_axis};
+use super::configuration::{self};
 use super::frame::{Decoder, MAX_MESSAGE};
 use super::message::{
-    Answer, CHUNK, Call, Configuration, Counters, FromBridge, GripperStatus, Health, Hello,
-    Refusal, Reply, Request, Restart, Sample, Status, VERSION,
+    Answer, CHUNK, Call, Configuration, FromBridge, Hello, Refusal, Reply, Request, Restart,
+    VERSION,
 };
 use super::outgoing::Outgoing;
 use super::slow::{Reading, Slow};
+use super::telling::status;
 use crate::app::Controls;
-use crate::clutch::Position;
 use crate::store::WeightsStore;
-use crate::telemetry::bump;
 use crate::{Config, Duration, Instant, Slot, timing};
 use embedded_io::{Read, ReadReady, Write};
 
@@ -19,8 +18,6 @@ use embedded_io::{Read, ReadReady, Write};
 const LEASE: Duration = Duration::from_millis(2_000);
 /// Least time between telemetry samples: at 115200 baud one takes about 14 ms of the line.
 const LEAST_PERIOD_MS: u16 = 20;
-/// Most bytes taken from the port a poll: bounds the poll's time.
-const BYTES_A_POLL: usize = 256;
 
 /// What a poll asks of the board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,42 +42,42 @@ pub struct Board {
 /// The bridge's end of one port.
 #[derive(Debug)]
 pub struct Server<S> {
-    port: S,
-    decoder: Decoder,
-    malformed: u32,
-    session: Option<Session>,
-    telemetry: Option<Telemetry>,
+    pub(super) port: S,
+    pub(super) decoder: Decoder,
+    pub(super) malformed: u32,
+    pub(super) session: Option<Session>,
+    pub(super) telemetry: Option<Telemetry>,
     /// CRC announced for the image under way, and by it the same image is known again.
     announced_crc: u32,
-    reply: Outgoing,
+    pub(super) reply: Outgoing,
     /// Session and sequence of the request that `reply` answers: when it comes again, so does the reply. Older ones of the
     /// same session that come late are not done any more.
-    answered: Option<(u32, u16)>,
+    pub(super) answered: Option<(u32, u16)>,
     /// The newest request that came while a reply was on its way or a request was done in pieces.
-    pending: heapless::Vec<u8, MAX_MESSAGE>,
+    pub(super) pending: heapless::Vec<u8, MAX_MESSAGE>,
     polled: Option<Instant>,
     /// What lies in the port came while nobody polled: a heartbeat in it says nothing of now.
-    is_stale: bool,
+    pub(super) is_stale: bool,
     /// The request that is done in pieces, its session and sequence.
     slow: Option<(Slow, u32, u16)>,
-    sample: Outgoing,
+    pub(super) sample: Outgoing,
     rebooting: bool,
     /// Told by the board.
-    board: Board,
+    pub(super) board: Board,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Session {
-    id: u32,
+pub(super) struct Session {
+    pub(super) id: u32,
     /// Sequence of its newest request.
-    newest: u16,
+    pub(super) newest: u16,
     heard: Instant,
 }
 
 #[derive(Debug, Clone, Copy)]
-struct Telemetry {
-    period: Duration,
-    due: Instant,
+pub(super) struct Telemetry {
+    pub(super) period: Duration,
+    pub(super) due: Instant,
 }
 
 impl<S: Read + ReadReady + Write> Server<S> {
@@ -160,64 +157,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         first.send(&mut self.port) || second.send(&mut self.port)
     }
 
-    /// Takes bytes until a request is whole or none are left.
-    fn receive<A: Controls<X>, const X: usize>(&mut self, app: &mut A) {
-        for _ in 0..BYTES_A_POLL {
-            let mut byte = [0];
-            let more = matches!(self.port.read_ready(), Ok(true));
-            if !more || !matches!(self.port.read(&mut byte), Ok(1)) {
-                if self.is_stale {
-                    // Of a frame that is half here the beginning is old.
-                    self.decoder.skip();
-                    self.is_stale = false;
-                }
-                return;
-            }
-            let pending = &mut self.pending;
-            let whole = self.decoder.push(byte[0], |message| {
-                pending.clear();
-                // What is longer is no request: the decoder has counted it.
-                let _ = pending.extend_from_slice(message);
-            });
-            if whole.is_some() && self.is_wanted(app) {
-                return;
-            }
-            if whole.is_some() {
-                self.pending.clear();
-            }
-        }
-    }
-
-    /// Whether the request that just came is to be served. A release has been obeyed when this returns.
-    fn is_wanted<A: Controls<X>, const X: usize>(&mut self, app: &mut A) -> bool {
-        match postcard::from_bytes::<Request<'_>>(&self.pending) {
-            Ok(Request {
-                call: Call::Release,
-                ..
-            }) => {
-                app.release();
-                true
-            }
-            Ok(_) => !self.is_stale,
-            Err(_) => {
-                bump(&mut self.malformed);
-                false
-            }
-        }
-    }
-
-    fn serve_pending<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) {
-        if self.pending.is_empty() {
-            return;
-        }
-        // Taken out, so that the rest of the server is free while the request is done.
-        let message = core::mem::take(&mut self.pending);
-        if let Ok(request) = postcard::from_bytes::<Request<'_>>(&message) {
-            self.serve(now, &request, app);
-        }
-    }
-
-    fn serve<A: Controls<X>, const X: usize>(
+    pub(super) fn serve<A: Controls<X>, const X: usize>(
         &mut self,
         now: Instant,
         request: &Request<'_>,
@@ -237,15 +177,6 @@ impl<S: Read + ReadReady + Write> Server<S> {
         if let Some(answer) = self.answer(now, request, app) {
             self.reply(session, sequence, answer);
         }
-    }
-
-    /// A request that was overtaken by a younger one of its session: doing it now could close a clutch that was opened since.
-    fn is_late(&self, request: &Request<'_>) -> bool {
-        let is_hello = matches!(request.call, Call::Hello { .. });
-        self.session.is_some_and(|own| {
-            let ahead = request.sequence.wrapping_sub(own.newest);
-            own.id == request.session && (ahead > u16::MAX / 2 || (ahead == 0 && !is_hello))
-        })
     }
 
     fn reply(&mut self, session: u32, sequence: u16, answer: Result<Answer, Refusal>) {
@@ -438,72 +369,6 @@ impl<S: Read + ReadReady + Write> Server<S> {
         };
         Ok(Answer::Done)
     }
-
-    fn take_sample<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &A) {
-        let Some(telemetry) = &mut self.telemetry else {
-            return;
-        };
-        if now < telemetry.due {
-            return;
-        }
-        telemetry.due = now.checked_add_duration(telemetry.period).unwrap_or(now);
-        let seen = app.telemetry();
-        self.sample.set(&FromBridge::Sample(Sample {
-            now_us: seen.now.as_ticks(),
-            state: seen.state,
-            frame_sequence: seen.frame_sequence,
-            angles: seen.angles,
-            target: seen
-                .target
-                .as_ref()
-                .map(|target| per_axis(target))
-                .unwrap_or_default(),
-            command: seen
-                .command
-                .map(|motion| per_axis(&motion.position))
-                .unwrap_or_default(),
-            position: seen
-                .status
-                .map(|status| per_axis(&status.position))
-                .unwrap_or_default(),
-            latency_us: seen
-                .latency
-                .map(|latency| latency.as_micros().min(u64::from(u32::MAX)) as u32),
-        }));
-    }
-
-    fn health<A: Controls<X>, const X: usize>(&self, app: &A) -> Health {
-        let seen = app.telemetry();
-        Health {
-            clutch: app.clutch(),
-            calibration: seen.calibration,
-            restart: self.board.restart,
-            stalls: seen.counters.stalls,
-        }
-    }
-
-    fn counters<A: Controls<X>, const X: usize>(&self, app: &A) -> Counters {
-        let seen = app.telemetry();
-        let host = self.decoder.counters();
-        Counters {
-            frames: seen.frame_sequence,
-            following_frames: seen.counters.following_frames,
-            answered_frames: seen.counters.answered_frames,
-            unusable_frames: seen.counters.unusable_frames,
-            commands: seen.sent_sequence,
-            statuses: seen.status_sequence,
-            gripper_errors: seen.counters.gripper_errors,
-            steps: seen.counters.steps,
-            late_steps: seen.counters.late_steps,
-            worst_late_us: seen.counters.worst_late_us,
-            holds: seen.counters.holds,
-            faults: seen.counters.faults,
-            host_frames: [host.good, host.crc, host.coding, host.oversized],
-            host_malformed: self.malformed,
-            bytes_lost: self.board.bytes_lost,
-            stack_used: self.board.stack_used,
-        }
-    }
 }
 
 /// The app, if its clutch is open.
@@ -528,30 +393,5 @@ fn configure<A: Controls<X>, const X: usize>(
 fn received<F: Slot>(store: &WeightsStore<F>) -> Answer {
     Answer::Received {
         bytes: store.progress().map_or(0, |(bytes, _)| bytes as u32),
-    }
-}
-
-fn status<A: Controls<X>, const X: usize>(app: &A) -> Status {
-    let seen = app.telemetry();
-    Status {
-        now_us: seen.now.as_ticks(),
-        state: seen.state,
-        engaged: app.is_engaged(),
-        heartbeat: app.clutch() == Position::Closed,
-        glove_answers: seen.glove_answers,
-        gripper: seen
-            .status
-            .filter(|_| seen.gripper_answers)
-            .map(|status| GripperStatus {
-                activation: status.activation,
-                fault: status.fault,
-                echo: per_axis(&status.echo),
-                position: per_axis(&status.position),
-            }),
-        active_slot: app.store().active().map(|(slot, _)| slot as u8),
-        transfer: app
-            .store()
-            .progress()
-            .map(|(there, announced)| (there as u32, announced as u32)),
     }
 }

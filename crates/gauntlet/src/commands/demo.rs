@@ -65,7 +65,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         motion: &motion,
     };
     told.tell(options, &tell, &finished)?;
-    let moved = finished.summary.first_motion.is_some();
+    let moved = finished.summary.first_motion_s.is_some();
     match finished.judge(driven)? {
         End::Time if !moved => Err(not_moved()),
         End::Time | End::Asked => Ok(()),
@@ -199,7 +199,6 @@ struct Told<'a> {
 impl Told<'_> {
     fn tell(&self, options: &Demo, tell: &Tell, finished: &Finished) -> Result<()> {
         let began = finished.ending.is_some();
-        let first_motion = finished.summary.first_motion.map(|us| us as f64 / 1e6);
         if options.json && began {
             return out::json(&json!({
                 "motion": self.motion.describe(),
@@ -207,16 +206,15 @@ impl Told<'_> {
                 "epochs": self.outcome.epochs,
                 "pairs": self.outcome.pairs,
                 "quality": self.outcome.quality,
-                "first_motion_s": first_motion,
                 "gripper": finished.gripper(),
                 "run": finished.summary,
                 "log": finished.log,
             }));
         }
         finished.tell(tell, "summary    ");
-        if let Some(first) = first_motion {
+        if let Some(first) = finished.summary.first_motion_s {
             tell.say(format_args!(
-                "motion     the gripper first moved with the hand {first:.1} s after the start"
+                "motion     the gripper first moved with the hand {first:.1} s after the clutch was closed"
             ));
         }
         if began {

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use bridge::Platform;
 use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::registers::{Kind, two_finger};
+use gripper::registers::Kind;
 use gripper::{Activation, Fault, Gripper, Status};
 
 use super::answer::Came;
@@ -281,8 +281,7 @@ fn talk(mut port: Port, place: &Place<'_>, findings: &mut Findings, interrupt: &
     } else {
         // The members of the family answer alike.
         let model = place.asked.model.and_then(|model| model.two_finger());
-        let mut driver =
-            TwoFinger::new(port, model.unwrap_or(two_finger::Model::default()), config);
+        let mut driver = TwoFinger::new(port, model.unwrap_or_default(), config);
         let sampled = sample(&mut driver, &mut pc, interrupt);
         told(&sampled, kind, &there, findings);
     }

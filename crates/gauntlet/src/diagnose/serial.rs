@@ -107,10 +107,7 @@ impl Tally {
     pub fn instead(&self) -> Came {
         let kind = std::mem::discriminant::<Came>;
         let common = |came: &&Came| {
-            let same = self
-                .others
-                .iter()
-                .filter(|other| kind(*other) == kind(came));
+            let same = self.others.iter().filter(|other| kind(other) == kind(came));
             (**came != Came::Silence, same.count())
         };
         let most = self.others.iter().max_by_key(common);

@@ -23,6 +23,8 @@ pub struct Numbers {
     pub cycles: Rate,
     /// From the oldest sample to the command.
     pub latency: Percentiles,
+    /// When the run began, µs.
+    begun: u64,
     commands: u64,
     /// A frame to be answered, and no command that rests on it yet.
     unanswered: bool,
@@ -42,9 +44,10 @@ pub struct Numbers {
 }
 
 impl Numbers {
-    /// Forgets what was counted while things were brought up; the run begins.
-    pub fn begin(&mut self) {
+    /// Forgets what was counted while things were brought up; the run begins at `now`.
+    pub fn begin(&mut self, now: Instant) {
         *self = Self {
+            begun: now.as_ticks(),
             last_sequence: self.last_sequence,
             ..Self::default()
         };
@@ -150,12 +153,16 @@ impl Numbers {
             steps: counters.map_or(0, |c| c.steps),
             late_steps: counters.map_or(0, |c| c.late_steps),
             worst_late_us: counters.map_or(0, |c| c.worst_late_us),
+            stalls: counters.map_or(0, |c| c.stalls),
             gripper_errors: counters.map_or(0, |c| c.gripper_errors),
             holds: counters.map_or(0, |c| c.holds),
             moving_s: rounded(self.moving.as_secs_f64()),
             held_s: rounded(self.held.as_secs_f64()),
             scheduling,
-            first_motion: self.first_motion.map(|at| at.as_ticks()),
+            first_motion_s: self.first_motion.map(|at| {
+                let since = at.as_ticks().saturating_sub(self.begun);
+                rounded(since as f64 / 1e6)
+            }),
         }
     }
 }
@@ -266,6 +273,7 @@ mod tests {
             let counters = bridge::telemetry::Counters {
                 late_steps,
                 worst_late_us,
+                stalls: u32::from(worst_late_us > 100_000),
                 steps: 1000,
                 holds: 1,
                 ..Default::default()
@@ -276,6 +284,34 @@ mod tests {
         assert!(!blamed(20, 3_000));
         assert!(blamed(21, 3_000));
         assert!(blamed(1, 20_000));
+    }
+
+    #[test]
+    fn a_stop_of_two_seconds_is_told_as_one() {
+        let counters = bridge::telemetry::Counters {
+            late_steps: 1,
+            worst_late_us: 2_013_000,
+            stalls: 1,
+            steps: 1000,
+            ..Default::default()
+        };
+        let summary = Numbers::default().summary(Some(counters), Scheduling::Shared);
+        let said = summary.lines().join("\n");
+        assert!(said.contains("stood still 1 times, up to 2.0 s"), "{said}");
+    }
+
+    #[test]
+    fn a_run_in_which_nothing_came_has_numbers_and_no_nan_in_json() {
+        let summary = Numbers::default().summary(None, Scheduling::Shared);
+        let json = serde_json::to_value(&summary).unwrap();
+        for name in [
+            "glove_frames_per_s",
+            "gripper_cycles_per_s",
+            "moving_s",
+            "held_s",
+        ] {
+            assert_eq!(json[name].as_f64(), Some(0.0), "{name}");
+        }
     }
 
     #[test]

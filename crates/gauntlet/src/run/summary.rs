@@ -12,8 +12,6 @@ use crate::stats::{seconds, short_or_dash};
 const LATE_ONE_IN: u64 = 50;
 /// A step this late, µs, costs a glove that is not to blame two exchanges.
 const VERY_LATE_US: u32 = 20_000;
-/// A step this late, µs, is a stop: the bridge holds, and nobody knows what happened meanwhile.
-const STOP_US: u32 = 100_000;
 
 pub(super) fn rounded(rate: f64) -> f64 {
     (rate * 100.0).round() / 100.0
@@ -56,6 +54,8 @@ pub struct Summary {
     pub late_steps: u32,
     /// The latest of them, µs.
     pub worst_late_us: u32,
+    /// Those of them after which more than 100 ms were missing: this program stood still.
+    pub stalls: u32,
     /// Cycles of the gripper that ended in an error.
     pub gripper_errors: u32,
     /// How often motion was held.
@@ -66,9 +66,8 @@ pub struct Summary {
     pub held_s: f64,
     /// How the bridge's thread was scheduled.
     pub scheduling: Scheduling,
-    /// When the gripper first moved with the hand, µs since the tool started.
-    #[serde(skip)]
-    pub first_motion: Option<u64>,
+    /// When the gripper first moved with the hand, s since driving began.
+    pub first_motion_s: Option<f64>,
 }
 
 impl Summary {
@@ -114,10 +113,11 @@ impl Summary {
                 seconds(Duration::from_secs_f64(self.moving_s))
             ));
         }
-        if self.worst_late_us >= STOP_US {
+        if self.stalls > 0 {
             lines.push(format!(
-                "stops      this program stood still for up to {} (suspended, stopped, or no processor free)",
-                short_or_dash(Some(self.worst_late_us.into()))
+                "stalls     this program stood still {} times, up to {} (suspended, stopped, or no processor free); motion was held",
+                self.stalls,
+                seconds(Duration::from_micros(self.worst_late_us.into()))
             ));
         }
         if self.too_busy() {

@@ -105,7 +105,7 @@ fn is_in_degrees(table: &mut Table, places: &[usize], values: &[Vec<f64>]) -> Re
     let degrees = beyond * 2 > places.len() && (SURELY_DEGREES..=360.0).contains(&most);
     if degrees {
         table.note(format!(
-            "angles up to {most} can only be degrees: taken as such (the header may say [deg])"
+            "angles up to {most:.1} can only be degrees: taken as such (the header may say [deg])"
         ));
     }
     Ok(degrees)

@@ -172,7 +172,7 @@ pub enum Error {
     /// An angle beyond a full turn.
     #[error(
         "{}, line {line} (row {row}), column `{column}`: {value} is beyond {}", file.display(),
-        if *degrees { "±360°; repair or remove this row" } else { "±2π; angles are in radians: multiply degrees by 0.0174533, or name their unit in the header (`index_mcp_flex [deg]`)" }
+        if *degrees { "±360°; repair or remove this row" } else { "±2π radians; take full turns away where a sensor counted on, or say in the header that angles are in degrees (`index_mcp_flex [deg]`)" }
     )]
     BeyondTurn {
         /// The file.

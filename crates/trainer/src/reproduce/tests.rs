@@ -100,6 +100,23 @@ fn stopping_keeps_what_is_done_and_damaged_files_count_as_not_done() {
     assert_eq!(store.find(&cell), None);
 }
 
+/// Says stop from the first work on, and counts the work that is done nevertheless.
+#[derive(Default)]
+struct AtOnce {
+    reports: AtomicUsize,
+}
+
+impl Watch for AtOnce {
+    fn stop(&self) -> bool {
+        self.reports.load(Ordering::Relaxed) > 0
+    }
+    fn advance(&self, work: f64) {
+        if work > 0.0 {
+            self.reports.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
 /// Curves pause a training to measure: a stop that is asked for there is not taken for such a pause.
 #[test]
 fn a_stop_at_a_point_of_a_curve_or_at_the_end_of_a_stage_is_a_stop() {
@@ -108,10 +125,14 @@ fn a_stop_at_a_point_of_a_curve_or_at_the_end_of_a_stage_is_a_stop() {
         trace_every: 4,
         ..cell(Source::Generated, Row::HaeAdaptive)
     };
-    let stopped = laboratory.run(&traced, &|| true);
+    let watch = AtOnce::default();
+    let stopped = laboratory.run(&traced, &watch);
     assert!(matches!(stopped, Err(Error::Stopped)));
-    let stopped = laboratory.stages(&traced, &|| true);
+    assert_eq!(watch.reports.into_inner(), 1);
+    let watch = AtOnce::default();
+    let stopped = laboratory.stages(&traced, &watch);
     assert!(matches!(stopped, Err(Error::Stopped)));
+    assert_eq!(watch.reports.into_inner(), 1);
 }
 
 #[test]

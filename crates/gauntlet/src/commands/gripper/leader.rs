@@ -55,6 +55,8 @@ pub(super) struct Leader<'a, const X: usize> {
     pub(super) newest: Status<X>,
     /// What the gripper is told; nothing before its positions are believed.
     command: Option<[u8; X]>,
+    /// What it was told last, to judge by.
+    told: Option<[u8; X]>,
     heard: Instant,
     looked: Instant,
     /// Writes before the move, and since when one could have left.
@@ -80,10 +82,11 @@ impl<'a, const X: usize> Leader<'a, X> {
             target,
             names: doing.driver.names().1,
             patience,
-            judge: Plausibility::new(doing.driver.speed()),
+            judge: Plausibility::new(doing.driver.speed()).patient(patience),
             progress: Progress::new(target, core::array::from_fn(|k| axes.moves(k)), patience),
             newest: status,
             command: None,
+            told: None,
             heard: now,
             looked: now,
             written: doing.driver.counters().writes,
@@ -116,7 +119,7 @@ impl<'a, const X: usize> Leader<'a, X> {
             return Some(End::Silent);
         }
         // No motion rests on a position older than it may be itself.
-        let fresh = since(now, self.newest.stamp) <= timing::STALE_MOTION + self.patience;
+        let fresh = self.is_fresh(now, &self.newest);
         let command = self.command.filter(|_| fresh);
         driver.set_motion(command.map(|command| self.motion(command)), now);
         None
@@ -128,14 +131,18 @@ impl<'a, const X: usize> Leader<'a, X> {
         now: Instant,
         status: &Status<X>,
     ) -> Option<End<X>> {
-        let verdict = self.judge.take(status, now);
         let gives_back = self.axes.gives_the_scissor_back(status)
             && matches!(status.fault, Fault::None | Fault::ModeChangeNeeded);
         if !gives_back && let Err(failure) = may_move(status, &self.options.target) {
             let hold = can_hold(status);
             return Some(End::Refused { failure, hold });
         }
-        match verdict {
+        if !self.is_fresh(now, status) {
+            // Nothing is made from it, not even a comparison.
+            self.command = None;
+            return self.late(driver, now, status);
+        }
+        match self.judge.take(status, now) {
             Verdict::First => {
                 self.command = None;
                 self.progress.restart();
@@ -167,11 +174,10 @@ impl<'a, const X: usize> Leader<'a, X> {
             self.ready_since = None;
             self.progress.restart();
         } else if driver.counters().writes == self.written {
-            let since_ready = since(now, *self.ready_since.get_or_insert(now));
-            if since_ready >= STUCK + self.patience {
-                return Some(self.refused(self.too_late(now, status)));
+            if let Some(end) = self.late(driver, now, status) {
+                return Some(end);
             }
-        } else if let Some(command) = self.command {
+        } else if let Some(command) = self.told {
             let echoes = core::array::from_fn(|axis| self.axes.echoes(axis));
             let echoed = self.progress.repeats(&status.echo, echoes);
             match self.progress.take(now, status, &command, echoed) {
@@ -187,8 +193,26 @@ impl<'a, const X: usize> Leader<'a, X> {
         });
         let command = next_command(self.target, status, self.axes, lead);
         self.progress.note_command(self.axes.block(command));
-        self.command = Some(command);
+        (self.command, self.told) = (Some(command), Some(command));
         None
+    }
+
+    /// The end of a move of which no command could leave for [`STUCK`].
+    fn late<B: Bench<X>>(
+        &mut self,
+        driver: &B,
+        now: Instant,
+        status: &Status<X>,
+    ) -> Option<End<X>> {
+        let ready = since(now, *self.ready_since.get_or_insert(now));
+        let told = driver.counters().writes != self.written;
+        let late = !told && ready >= STUCK + self.patience;
+        late.then(|| self.refused(self.too_late(now, status)))
+    }
+
+    /// Whether a motion may rest on it: one is no older than that itself.
+    fn is_fresh(&self, now: Instant, status: &Status<X>) -> bool {
+        since(now, status.stamp) <= timing::STALE_MOTION + self.patience
     }
 
     fn refused(&self, failure: Failure) -> End<X> {
@@ -210,13 +234,12 @@ impl<'a, const X: usize> Leader<'a, X> {
     /// short, so it does not look at it. A status from before a stall is not held on: it is read anew.
     pub(super) fn hold<B: Bench<X>>(&mut self, doing: &mut Doing<'_, B>) -> bool {
         let written = doing.driver.counters().writes;
-        let fresh = timing::STALE_MOTION + self.patience;
         let end = std::time::Instant::now() + HOLD_WAIT + 6 * doing.target.settings().patience();
         let mut told: Option<[u8; X]> = None;
         let held = |driver: &B| driver.counters().writes != written && driver.accepted();
         while std::time::Instant::now() < end && !(told.is_some() && held(&doing.driver)) {
             let now = doing.waiter.clock.now();
-            if told.is_none() && since(now, self.newest.stamp) <= fresh {
+            if told.is_none() && self.is_fresh(now, &self.newest) {
                 told = Some(self.newest.hold());
             }
             let motion = told.map(|position| self.motion(position));

@@ -29,6 +29,8 @@ pub(super) use bench::{Bench, Waiter};
 
 /// `watch` shows changes at most this often.
 const WATCH_STEP: Duration = Duration::from_millis(100);
+/// A line without an answer for this long at its end is dead.
+const WATCH_SILENCE: Duration = Duration::from_secs(1);
 /// And says at least this often that it still does.
 const WATCH_BEAT: Duration = Duration::from_secs(1);
 
@@ -184,7 +186,7 @@ fn no_answer<B: Bench<X>, const X: usize>(
         let next = match error {
             crate::tcp::Error::Timeout => format!(
                 "{}; ending other programs that are connected to it; another --unit (2 by default); the gripper's power",
-                target.patient("status")
+                target.patient_for("status", crate::line::MOST_PATIENCE)
             ),
             error => error.next_step().to_owned(),
         };
@@ -335,6 +337,7 @@ impl<B> Doing<'_, B> {
         B: Bench<X>,
     {
         let (place, raw, json) = (self.place(), self.target.raw, self.target.json);
+        let patience = 4 * self.target.settings().patience();
         let started = Instant::now();
         if !json {
             say!(
@@ -342,8 +345,14 @@ impl<B> Doing<'_, B> {
             );
         }
         let mut shown: Option<(Instant, String)> = None;
+        let (mut answered, mut looked) = (started, started);
         self.waiter
             .pump(&mut self.driver, time, |driver, _, heard| {
+                if heard.as_ref().is_some_and(Result::is_ok) || looked.elapsed() >= WATCH_STEP {
+                    // Time in which nobody listened is no silence.
+                    answered = Instant::now();
+                }
+                looked = Instant::now();
                 let text = match heard {
                     None => return ControlFlow::<()>::Continue(()),
                     Some(Ok(status)) if json => {
@@ -378,6 +387,14 @@ impl<B> Doing<'_, B> {
                 }
                 ControlFlow::Continue(())
             });
+        let silent = answered.elapsed();
+        if silent >= WATCH_SILENCE + patience && !self.waiter.interrupt.asked() {
+            let what = format!(
+                "the gripper has not answered for {:.0} s",
+                silent.as_secs_f32()
+            );
+            return Err(Failure::new(what, self.target.doctor()).into());
+        }
         Ok(())
     }
 }

@@ -110,8 +110,8 @@ impl<const X: usize> Progress<X> {
         command: &[u8; X],
         echoed: bool,
     ) -> Judgement<X> {
-        for axis in 0..X {
-            self.follow(axis, now, status.position[axis], command[axis]);
+        for (axis, told) in command.iter().enumerate() {
+            self.follow(axis, now, status.position[axis], *told);
         }
         if !status.going_to || !echoed {
             let start = *self.untaken.get_or_insert(now);

@@ -1,0 +1,102 @@
+//! What the server tells of the bridge.
+
+use super::configuration::per_axis;
+use super::message::{Counters, FromBridge, GripperStatus, Health, Sample, Status};
+use super::server::Server;
+use crate::Instant;
+use crate::app::Controls;
+use crate::clutch::Position;
+
+impl<S> Server<S> {
+    pub(super) fn take_sample<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &A) {
+        let Some(telemetry) = &mut self.telemetry else {
+            return;
+        };
+        if now < telemetry.due {
+            return;
+        }
+        telemetry.due = now.checked_add_duration(telemetry.period).unwrap_or(now);
+        let seen = app.telemetry();
+        self.sample.set(&FromBridge::Sample(Sample {
+            now_us: seen.now.as_ticks(),
+            state: seen.state,
+            frame_sequence: seen.frame_sequence,
+            angles: seen.angles,
+            target: seen
+                .target
+                .as_ref()
+                .map(|target| per_axis(target))
+                .unwrap_or_default(),
+            command: seen
+                .command
+                .map(|motion| per_axis(&motion.position))
+                .unwrap_or_default(),
+            position: seen
+                .status
+                .map(|status| per_axis(&status.position))
+                .unwrap_or_default(),
+            latency_us: seen
+                .latency
+                .map(|latency| latency.as_micros().min(u64::from(u32::MAX)) as u32),
+        }));
+    }
+
+    pub(super) fn health<A: Controls<X>, const X: usize>(&self, app: &A) -> Health {
+        let seen = app.telemetry();
+        Health {
+            clutch: app.clutch(),
+            calibration: seen.calibration,
+            restart: self.board.restart,
+            stalls: seen.counters.stalls,
+        }
+    }
+
+    pub(super) fn counters<A: Controls<X>, const X: usize>(&self, app: &A) -> Counters {
+        let seen = app.telemetry();
+        let host = self.decoder.counters();
+        Counters {
+            frames: seen.frame_sequence,
+            following_frames: seen.counters.following_frames,
+            answered_frames: seen.counters.answered_frames,
+            unusable_frames: seen.counters.unusable_frames,
+            commands: seen.sent_sequence,
+            statuses: seen.status_sequence,
+            gripper_errors: seen.counters.gripper_errors,
+            steps: seen.counters.steps,
+            late_steps: seen.counters.late_steps,
+            worst_late_us: seen.counters.worst_late_us,
+            holds: seen.counters.holds,
+            faults: seen.counters.faults,
+            host_frames: [host.good, host.crc, host.coding, host.oversized],
+            host_malformed: self.malformed,
+            bytes_lost: self.board.bytes_lost,
+            stack_used: self.board.stack_used,
+        }
+    }
+}
+
+/// What the bridge is doing.
+pub(super) fn status<A: Controls<X>, const X: usize>(app: &A) -> Status {
+    let seen = app.telemetry();
+    Status {
+        now_us: seen.now.as_ticks(),
+        state: seen.state,
+        engaged: app.is_engaged(),
+        heartbeat: app.clutch() == Position::Closed,
+        glove_answers: seen.glove_answers,
+        gripper: seen
+            .status
+            .filter(|_| seen.gripper_answers)
+            .map(|status| GripperStatus {
+                activation: status.activation,
+                fault: status.fault,
+                echo: per_axis(&status.echo),
+                position: per_axis(&status.position),
+            }),
+        active_slot: app.store().active().map(|(slot, _)| slot as u8),
+        transfer: app
+            .store()
+            .progress()
+            .map(|(there, announced)| (there as u32, announced as u32)),
+    }
+}
