@@ -14,22 +14,21 @@ fn page() -> String {
 /// Every `--option` in a text.
 fn options(text: &str) -> BTreeSet<String> {
     let words = text.split(|c: char| !(c.is_ascii_alphanumeric() || c == '-'));
-    let options = words.filter(|word| word.starts_with("--") && word.len() > 2);
-    options
-        .map(|word| word.trim_end_matches('-').to_owned())
-        .collect()
+    let is_option =
+        |word: &&str| word.starts_with("--") && !word.starts_with("---") && word.len() > 2;
+    words.filter(is_option).map(str::to_owned).collect()
 }
 
 /// The long options of a verb and of the verbs below it, other spellings too.
 fn known(verb: &Command) -> BTreeSet<String> {
-    let mut known = BTreeSet::new();
+    let mut names = BTreeSet::new();
     for argument in verb.get_arguments().filter(|a| a.get_id() != "help") {
         let aliases = argument.get_all_aliases().unwrap_or_default();
-        let names = argument.get_long().into_iter().chain(aliases);
-        known.extend(names.map(|name| format!("--{name}")));
+        let spellings = argument.get_long().into_iter().chain(aliases);
+        names.extend(spellings.map(|name| format!("--{name}")));
     }
-    known.extend(verb.get_subcommands().flat_map(known));
-    known
+    names.extend(verb.get_subcommands().flat_map(known));
+    names
 }
 
 #[test]
