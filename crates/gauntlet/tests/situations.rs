@@ -254,7 +254,10 @@ impl Device for Noted {
     }
 
     fn next_due(&self) -> Option<rig::Instant> {
-        self.gripper.next_due()
+        // The other master speaks at once.
+        let word = self.word.lock().unwrap().is_some();
+        let at_once = word.then(|| rig::Instant::from_ticks(0));
+        at_once.or_else(|| self.gripper.next_due())
     }
 
     fn baud(&self) -> u32 {
@@ -276,7 +279,7 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     let simulation = Simulation::start(true, false);
     let gripper = ready(Family::ThreeFinger);
     let (noted, notes, word) = noted(&gripper);
-    let (_handle, path) = behind_pty(noted);
+    let (handle, path) = behind_pty(noted);
     let (glove, model) = (simulation.glove(), model().to_str().unwrap());
     let mut teleop = start(&[
         "teleop",
@@ -293,7 +296,7 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     ]);
     let rest = until_line(teleop.stdout.take().unwrap(), "following");
     let id = Pid::from_raw(i32::try_from(teleop.id()).unwrap()).unwrap();
-    let mut commands = 0;
+    let (mut commands, mut moved) = (0, 0.0);
     for stall in 0..4_u64 {
         std::thread::sleep(Duration::from_millis(1_500 + 7 * stall));
         kill_process(id, Signal::STOP).unwrap();
@@ -308,7 +311,10 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
             };
         }
         *word.lock().unwrap() = Some(command(&block));
+        let before = gripper.positions();
         std::thread::sleep(Duration::from_millis(700));
+        gripper.run_until(handle.clock().now());
+        moved += f32::abs(gripper.positions()[0] - before[0]);
         notes.lock().unwrap().clear();
         kill_process(id, Signal::CONT).unwrap();
         std::thread::sleep(Duration::from_millis(500));
@@ -326,6 +332,7 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     }
     interrupt(&teleop);
     wait(&mut teleop);
+    assert!(moved > 50.0, "nobody moved the gripper meanwhile: {moved}");
     assert!(commands > 0, "no command came after any of the stalls");
     rest.join().unwrap();
 }

@@ -14,7 +14,7 @@ use super::glove::glove_answers;
 use super::place::{Asked, Place, kind_of};
 use super::raw::{hex, text};
 use super::search::{Found, OTHER_BAUDS, Outcome, TRIES, search};
-use super::serial::{exchange, exchanges, words};
+use super::serial::{Tally, exchange, exchanges, words};
 use super::{Findings, network};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
@@ -91,6 +91,18 @@ fn serial(place: &Place<'_>, thorough: bool, findings: &mut Findings, interrupt:
         return talk(port, &place, findings, interrupt);
     }
     drop(port);
+    unanswered(place, &tally, thorough, findings, interrupt);
+}
+
+/// No good answer came where it was asked.
+fn unanswered(
+    place: &Place<'_>,
+    tally: &Tally,
+    thorough: bool,
+    findings: &mut Findings,
+    interrupt: &Interrupt,
+) {
+    let (unit, baud) = (place.unit(), place.baud());
     let instead = tally.instead();
     let is_spoiled = matches!(
         instead,

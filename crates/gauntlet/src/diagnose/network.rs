@@ -236,74 +236,91 @@ fn second_connection(
 /// It accepts, and no answer comes to the gripper's own question.
 fn unanswered(
     address: &tcp::Address,
-    mut wire: Wire,
+    wire: Wire,
     tally: &Tally,
     place: &Place<'_>,
     findings: &mut Findings,
     interrupt: &Interrupt,
 ) {
     let instead = tally.instead.clone().unwrap_or(Came::Silence);
-    if matches!(instead, Came::Silence | Came::Exception(_)) {
-        let others = OTHER_UNITS.into_iter().filter(|unit| *unit != place.unit());
-        for unit in others.clone() {
-            if wire
-                .ask(unit, READ_INPUT, WAIT_UNIT, interrupt)
-                .came
-                .is_answer()
-            {
-                let there = place.with_unit(unit);
-                let what = format!("unit {unit} answers, not unit {}", place.unit());
-                findings.wrong("unit", what, there.command("gripper status"));
-                drop(wire);
-                return status(address, &there, findings, interrupt);
+    let what = match instead {
+        Came::Silence | Came::Exception(_) => {
+            if answers_otherwise(address, wire, place, findings, interrupt) {
+                return;
             }
+            if interrupt.asked() {
+                return super::gripper::interrupted(findings);
+            }
+            let asked: Vec<String> = other_units(place).map(|unit| unit.to_string()).collect();
+            let came = match instead {
+                Came::Silence => "it accepts, but no answer comes".to_owned(),
+                _ => instead.words(),
+            };
+            format!(
+                "{came}; asked unit {}, then {}",
+                place.unit(),
+                asked.join(", ")
+            )
         }
-        if wire
-            .ask(place.unit(), READ_HOLDING, WAIT_UNIT, interrupt)
-            .came
-            .is_answer()
-        {
-            return findings.wrong(
-                "unit",
-                "function 03 is answered, function 04 is not: no 3-Finger gripper with Modbus TCP, perhaps a gateway to a \
-                 serial one",
-                "the gripper's serial line: `gauntlet doctor --gripper /dev/ttyUSB0`",
-            );
-        }
-        drop(wire);
-        if serial_over_tcp(address, interrupt) {
-            return findings.wrong(
-                "connection",
-                "Modbus RTU answers inside TCP: this is a serial device server that passes bytes, no Modbus TCP",
-                format!(
-                    "its setting for Modbus TCP; or `socat pty,link=/tmp/gripper,raw,echo=0 tcp:{}:{}`, and then \
-                     `gauntlet doctor --gripper /tmp/gripper`",
-                    address.host, address.port
-                ),
-            );
-        }
-        if interrupt.asked() {
-            return super::gripper::interrupted(findings);
-        }
-        let asked: Vec<String> = others.map(|unit| unit.to_string()).collect();
-        let what = format!(
-            "{}; asked unit {}, then {}",
-            if instead == Came::Silence {
-                "it accepts, but no answer comes".to_owned()
-            } else {
-                instead.words()
-            },
-            place.unit(),
-            asked.join(", ")
-        );
-        return findings.wrong("gripper", what, busy(address, &instead));
-    }
+        _ => instead.words(),
+    };
     let next = match instead {
-        Came::Closed => busy(address, &instead),
+        Came::Silence | Came::Exception(_) | Came::Closed => busy(address, &instead),
         Came::Late => "a way to the gripper without that delay: Gauntlet waits for 1.2 s at most (--patience 1000)".to_owned(),
         _ => "whether this address and port belong to the gripper (192.168.1.11, port 502 as delivered)".to_owned(),
     };
-    findings.wrong("gripper", instead.words(), next);
+    findings.wrong("gripper", what, next);
+}
+
+fn other_units(place: &Place<'_>) -> impl Iterator<Item = u8> {
+    let own = place.unit();
+    OTHER_UNITS.into_iter().filter(move |unit| *unit != own)
+}
+
+/// Another unit, another function or another protocol is answered; tells which.
+fn answers_otherwise(
+    address: &tcp::Address,
+    mut wire: Wire,
+    place: &Place<'_>,
+    findings: &mut Findings,
+    interrupt: &Interrupt,
+) -> bool {
+    let mut answers = |unit, function| {
+        wire.ask(unit, function, WAIT_UNIT, interrupt)
+            .came
+            .is_answer()
+    };
+    if let Some(unit) = other_units(place).find(|unit| answers(*unit, READ_INPUT)) {
+        let there = place.with_unit(unit);
+        let what = format!("unit {unit} answers, not unit {}", place.unit());
+        findings.wrong("unit", what, there.command("gripper status"));
+        drop(wire);
+        status(address, &there, findings, interrupt);
+        return true;
+    }
+    if answers(place.unit(), READ_HOLDING) {
+        findings.wrong(
+            "unit",
+            "function 03 is answered, function 04 is not: no 3-Finger gripper with Modbus TCP, perhaps a gateway to a \
+             serial one",
+            "the gripper's serial line: `gauntlet doctor --gripper /dev/ttyUSB0`",
+        );
+        return true;
+    }
+    drop(wire);
+    let is_serial = serial_over_tcp(address, interrupt);
+    if is_serial {
+        findings.wrong(
+            "connection",
+            "Modbus RTU answers inside TCP: this is a serial device server that passes bytes, no Modbus TCP",
+            format!(
+                "its setting for Modbus TCP; or `socat pty,link=/tmp/gripper,raw,echo=0 tcp:{}:{}`, and then \
+                 `gauntlet doctor --gripper /tmp/gripper`",
+                address.host, address.port
+            ),
+        );
+    }
+    is_serial
 }
 
 /// What to try where it accepts and says nothing.

@@ -125,7 +125,8 @@ impl Tally {
     /// Tells what is odd about the answers. Returns the patience that they need, if it is more than `place` has.
     pub fn tell(&self, place: &Place<'_>, findings: &mut Findings) -> Option<Duration> {
         self.tell_of_losses(findings);
-        self.tell_of_surroundings(place, findings);
+        self.tell_of_second_answers(place, findings);
+        self.tell_of_surroundings(findings);
         if holds_answer(&self.unasked) {
             let what =
                 "an answer came before anything was asked: late, to whoever used the port before";
@@ -161,7 +162,7 @@ impl Tally {
         }
     }
 
-    fn tell_of_surroundings(&self, place: &Place<'_>, findings: &mut Findings) {
+    fn tell_of_surroundings(&self, findings: &mut Findings) {
         let total = self.answers.len();
         let with = |is: fn(&Answer) -> bool| -> Vec<&Answer> {
             self.answers
@@ -173,20 +174,6 @@ impl Tally {
         if !with(|a| a.echoed).is_empty() {
             let what = "the adapter gives back what it is given; the driver takes that off";
             findings.note("line", what, "nothing: it works");
-        }
-        let twice = with(|a| a.second.is_some());
-        if let Some(second) = twice.first().and_then(|answer| answer.second) {
-            let unit = place.unit();
-            let who = if second == unit {
-                format!("two devices answer as unit {unit}")
-            } else {
-                format!("unit {second} answers too, although unit {unit} is asked")
-            };
-            findings.wrong(
-                "unit",
-                format!("{who}: {} of {total} answers were followed by a second one", twice.len()),
-                "unplugging the other device, or giving it a unit number of its own in the maker's tool",
-            );
         }
         if !with(|a| a.earlier).is_empty() {
             let what = "the answer to an earlier question came with the new one: answers queue up on the way";
@@ -223,6 +210,29 @@ impl Tally {
                 "nothing: it works; bias and termination of the bus take them away",
             );
         }
+    }
+
+    fn tell_of_second_answers(&self, place: &Place<'_>, findings: &mut Findings) {
+        let total = self.answers.len();
+        let seconds: Vec<u8> = self
+            .answers
+            .iter()
+            .filter_map(|(answer, _)| answer.second)
+            .collect();
+        let Some(second) = seconds.first().copied() else {
+            return;
+        };
+        let unit = place.unit();
+        let who = if second == unit {
+            format!("two devices answer as unit {unit}")
+        } else {
+            format!("unit {second} answers too, although unit {unit} is asked")
+        };
+        findings.wrong(
+            "unit",
+            format!("{who}: {} of {total} answers were followed by a second one", seconds.len()),
+            "unplugging the other device, or giving it a unit number of its own in the maker's tool",
+        );
     }
 
     fn tell_of_lateness(&self, place: &Place<'_>, findings: &mut Findings) -> Option<Duration> {
