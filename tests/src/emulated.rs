@@ -150,8 +150,8 @@ pub struct Loop {
     pub link: HostLink,
     /// The gripper on UART 2.
     pub gripper: VirtualGripper,
-    _emulator: Emulator,
-    _ports: [Handle; 2],
+    emulator: Emulator,
+    ports: [Handle; 2],
 }
 
 /// What a stretch of time did to the counters.
@@ -216,9 +216,22 @@ impl Loop {
         Self {
             link,
             gripper,
-            _emulator: emulator,
-            _ports: ports,
+            emulator,
+            ports,
         }
+    }
+
+    /// The emulator's process.
+    ///
+    /// # Panics
+    /// It has ended.
+    pub fn process(&self) -> u32 {
+        self.emulator.process_id().expect("an emulator that runs")
+    }
+
+    /// The virtual gripper's clock.
+    pub fn clock(&self) -> &rig::Clock {
+        self.ports[1].clock()
     }
 
     /// Holds the clutch for `time`, after 2 s for settling and blending.

@@ -8,6 +8,7 @@ pub mod emulated;
 pub mod images;
 pub mod power_cuts;
 pub mod slot_contents;
+pub mod standstill;
 pub mod trace;
 
 #[allow(missing_docs)]

@@ -20,3 +20,31 @@ pub fn gripper() -> Result<(), Failure> {
         ]),
     )
 }
+
+/// 50 stalls of 0.1 to 3 s with real processes, on the PC and in QEMU.
+pub fn stalls() -> Result<(), Failure> {
+    let firmware = crate::firmware::build()?;
+    step::run(
+        "the tool",
+        &mut cargo(&["build", "--release", "--locked", "--package", "gauntlet"]),
+    )?;
+    let tool = step::workspace_root().join("target/release/gauntlet");
+    step::run(
+        "stalls",
+        cargo(&[
+            "test",
+            "--locked",
+            "--package",
+            "loop-tests",
+            "--test",
+            "standstill",
+            "--",
+            "--ignored",
+            "--nocapture",
+            "--test-threads",
+            "1",
+        ])
+        .env("GAUNTLET", tool)
+        .env("GAUNTLET_FIRMWARE", firmware),
+    )
+}

@@ -199,6 +199,11 @@ impl Emulator {
         }
     }
 
+    /// The emulator's process, while the power is on.
+    pub fn process_id(&self) -> Option<u32> {
+        self.child.as_ref().map(std::process::Child::id)
+    }
+
     /// Whether the machine runs.
     pub fn is_on(&mut self) -> bool {
         self.child
