@@ -95,12 +95,17 @@ fn axes(view: &View, width: u16) -> Vec<Line<'static>> {
 
 fn rates(view: &View, width: u16) -> Vec<Line<'static>> {
     let text = format!(
-        "glove {:.0}/s gripper {:.0}/s p99 {} dropped {}",
+        "glove {:.0}/s gripper {:.0}/s p99 {}",
         view.frames_per_s,
         view.cycles_per_s,
         short_or_dash(view.latency_p99),
-        view.dropped,
     );
+    let more = format!("{text} dropped {}", view.dropped);
+    let text = if more.len() <= width.into() {
+        more
+    } else {
+        text
+    };
     wrapped(&text, width).into_iter().map(Line::raw).collect()
 }
 

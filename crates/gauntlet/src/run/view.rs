@@ -1,0 +1,83 @@
+//! The view of a run, put together.
+
+use std::time::{Duration, Instant};
+
+use bridge::clutch::Position;
+
+use super::{Options, Run, shown};
+use crate::live::View;
+use crate::session::Snapshot;
+
+impl Run {
+    pub(super) fn view(&mut self, options: &Options, elapsed: Duration, keys: bool) -> View {
+        let snapshot = self.session.snapshot();
+        let now = self.clock.now();
+        let mut view = View {
+            title: options.title.to_owned(),
+            elapsed,
+            total: options.seconds,
+            state: "starting".to_owned(),
+            following: false,
+            fingers: Vec::new(),
+            hand_age: None,
+            axes: Vec::new(),
+            gripper_age: None,
+            frames_per_s: self.numbers.frames.now(now.as_ticks()),
+            cycles_per_s: self.numbers.cycles.now(now.as_ticks()),
+            latency_p50: self.numbers.latency.at(0.5),
+            latency_p99: self.numbers.latency.at(0.99),
+            dropped: self.numbers.dropped(),
+            faults: self.faults_now(snapshot.as_ref()),
+            fault_count: self.numbers.faults(),
+            keys: if keys {
+                "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
+            } else {
+                "Ctrl-C: hold and end"
+            },
+        };
+        if let Some(snapshot) = &snapshot {
+            view.state = self.state_words(snapshot, keys);
+            view.following = snapshot.state.is_moving();
+            view.fingers = shown::fingers(snapshot);
+            view.hand_age = shown::glove_age(snapshot);
+            view.axes = self.shown.axes(snapshot, Instant::now());
+            view.gripper_age = shown::gripper_age(snapshot);
+        }
+        view
+    }
+
+    /// The state, and what a person can do about it.
+    fn state_words(&self, snapshot: &Snapshot, keys: bool) -> String {
+        let name = snapshot.state.name();
+        if keys && !self.clutch {
+            match snapshot.clutch {
+                Position::Open => return format!("{name}: space closes the clutch"),
+                Position::Expired => return format!("{name}: space closes the clutch again"),
+                Position::Closed | Position::Lost => {}
+            }
+        }
+        name.to_owned()
+    }
+
+    fn faults_now(&mut self, snapshot: Option<&Snapshot>) -> Vec<String> {
+        let mut faults = Vec::new();
+        for (port, device) in self.session.ports().iter().zip(["glove", "gripper"]) {
+            if !port.plugged() {
+                faults.push(format!(
+                    "{device}: {} is unplugged, waiting for it to come back",
+                    port.path().display()
+                ));
+            }
+        }
+        faults.extend(self.log_end());
+        if self.expired {
+            faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
+        }
+        if let Some(snapshot) = snapshot {
+            let scheduling = self.session.scheduling();
+            let now = Instant::now();
+            faults.extend(self.shown.faults(snapshot, scheduling, now));
+        }
+        faults
+    }
+}
