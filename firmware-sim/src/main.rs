@@ -89,7 +89,9 @@ fn turn(
     started: Restart,
 ) -> Outcome {
     let due = app.step();
-    let outcome = server.poll(app.telemetry().now, app);
+    // By the clock as it is now: the step may have stood still in between.
+    let now = app.platform_mut().now();
+    let outcome = server.poll(now, app);
     server.tell_board(protocol::Board {
         bytes_lost: board::bytes_lost(),
         stack_used: stack.look(),

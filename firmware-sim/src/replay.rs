@@ -284,7 +284,8 @@ impl<'s, 't, F: Slot, R: Gripper<AXES>> Replay<'s, 't, F, R> {
 
     /// The part of a turn that comes after the loop's step: the host, the values for the output, the wait.
     pub fn rest(&mut self, due: Instant) -> Outcome {
-        let outcome = self.server.poll(self.app.telemetry().now, &mut self.app);
+        let now = self.app.platform_mut().now();
+        let outcome = self.server.poll(now, &mut self.app);
         self.put_values();
         self.app.platform_mut().wait_until(due);
         outcome

@@ -118,7 +118,7 @@ pub fn record(
     while clock.now().as_ticks() < end {
         host.speak(clock.now().as_ticks(), &line);
         let due = app.step();
-        if server.poll(app.telemetry().now, &mut app) == Outcome::Reboot {
+        if server.poll(clock.now(), &mut app) == Outcome::Reboot {
             break;
         }
         let due = due.min(Instant::from_ticks(host.due));

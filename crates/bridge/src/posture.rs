@@ -62,6 +62,18 @@ impl Posture {
         *self = Self::new(self.side, calibration);
     }
 
+    /// The other hand. Angles measured so far do not count; what is not trusted stays so.
+    pub fn set_side(&mut self, side: Side) {
+        let distrusted = self.distrusted;
+        *self = Self::new(side, self.calibration);
+        self.distrusted = distrusted;
+    }
+
+    /// Segments whose samples are not used although they look good (bit k: segment k).
+    pub fn distrusted(&self) -> u16 {
+        self.distrusted
+    }
+
     /// Does not use a segment's samples until the next calibration. Returns whether that is new.
     pub fn distrust(&mut self, segment: usize) -> bool {
         let bit = bit(segment);

@@ -22,7 +22,7 @@ pub const MAX_AGE: Duration = Duration::from_ticks(100_000);
 /// The host sends the clutch's heartbeat this often.
 pub const HEARTBEAT: Duration = Duration::from_ticks(100_000);
 
-/// Without a heartbeat for this long motion is held: two may be lost, with half a period to spare.
+/// Without a heartbeat for this long motion is held: one may be lost, with half a period to spare.
 pub const HEARTBEAT_TIMEOUT: Duration = Duration::from_ticks(250_000);
 
 /// Without a heartbeat for this long the clutch has opened by itself: only an act of a person closes it again.

@@ -122,6 +122,34 @@ fn what_lay_in_the_port_while_the_bridge_stood_still_closes_and_keeps_nothing() 
 }
 
 #[test]
+fn what_waited_behind_a_reply_while_the_bridge_stood_still_is_not_done() {
+    let mut host = ready().hello();
+    assert!(host.ask(Call::Telemetry { period_ms: 20 }).is_ok());
+    host.line.block(true);
+    host.run(100 * MS);
+    host.send(7, host.sequence + 1, Call::Engage);
+    host.run(10 * MS);
+    host.bench.clock.advance(rig::Duration::from_millis(800));
+    host.line.block(false);
+    host.run(300 * MS);
+    assert!(!host.bench.app.is_engaged());
+}
+
+#[test]
+fn a_release_that_comes_late_makes_no_older_request_young() {
+    let mut host = ready().hello();
+    let first = host.sequence;
+    assert!(host.ask(Call::Release).is_ok());
+    engaged(&mut host);
+    assert!(host.ask(Call::Release).is_ok());
+    host.send(7, first + 1, Call::Release);
+    host.run(50 * MS);
+    host.send(7, first + 2, Call::Engage);
+    host.run(100 * MS);
+    assert!(!host.bench.app.is_engaged());
+}
+
+#[test]
 fn a_release_among_old_bytes_is_obeyed() {
     let mut host = ready().hello();
     following(&mut host);

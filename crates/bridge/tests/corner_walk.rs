@@ -100,7 +100,15 @@ fn target(world: &mut World) -> [f32; 4] {
     [low(90, 166), low(90, 166), low(90, 166), low(120, 136)]
 }
 
-fn walk(seed: u64) -> (f32, u32) {
+/// What a walk came to: how far outside the gripper was at worst, how far from its targets at their ends, steps in motion.
+struct Walked {
+    outside: f32,
+    missed: f32,
+    moved: u32,
+}
+
+/// A minute of targets, each kept for so many milliseconds.
+fn walk(seed: u64, kept: u64) -> Walked {
     let mut world = World {
         rng: ChaCha8Rng::seed_from_u64(seed),
         now: 0,
@@ -125,9 +133,17 @@ fn walk(seed: u64) -> (f32, u32) {
         status: None,
         weights: Weights::Ready,
     };
-    let (mut wanted, mut worst, mut moved) = ([100.0; 4], 0.0_f32, 0);
+    let (mut wanted, mut aim) = ([100.0; 4], None);
+    let mut walked = Walked {
+        outside: 0.0,
+        missed: 0.0,
+        moved: 0,
+    };
     for tick in 0..60_000_u64 {
-        if tick.is_multiple_of(300) {
+        if tick.is_multiple_of(kept) {
+            if let Some(aim) = aim {
+                walked.missed = walked.missed.max(distance(&world.position, &aim));
+            }
             wanted = target(&mut world);
             world.speed = core::array::from_fn(|_| (2 + world.below(17)) as f32 / 100.0);
         }
@@ -149,11 +165,18 @@ fn walk(seed: u64) -> (f32, u32) {
             output: Ok(wanted),
         });
         let output = supervisor.step(now, &inputs);
-        moved += u32::from(output.state.is_moving());
+        aim = output.target;
+        walked.moved += u32::from(output.state.is_moving());
         world.request(output.motion.map(|motion| motion.position));
-        worst = worst.max(outside(&world.position));
+        walked.outside = walked.outside.max(outside(&world.position));
     }
-    (worst, moved)
+    walked
+}
+
+/// The farthest of the axes, counts.
+fn distance(a: &[f32; 4], b: &[f32; 4]) -> f32 {
+    let each = a.iter().zip(b).map(|(a, b)| (a - b).abs());
+    each.fold(0.0, f32::max)
 }
 
 /// How far a position is beyond the edge, counts: how much every axis must open for it to be allowed.
@@ -168,9 +191,22 @@ fn outside(position: &[f32; 4]) -> f32 {
 #[test]
 fn the_true_position_stays_inside_however_late_the_statuses_are() {
     for seed in 0..12 {
-        let (worst, moved) = walk(seed);
-        println!("seed {seed}: {worst:.1} counts outside at worst, {moved} steps in motion");
+        let Walked { outside, moved, .. } = walk(seed, 300);
+        println!("seed {seed}: {outside:.1} counts outside at worst, {moved} steps in motion");
         assert!(moved > 4_000, "seed {seed}: {moved} steps in motion");
-        assert!(worst == 0.0, "seed {seed}: {worst} counts outside");
+        assert!(outside == 0.0, "seed {seed}: {outside} counts outside");
+    }
+}
+
+#[test]
+fn a_hand_that_stands_still_is_reached_from_every_side_of_the_corner() {
+    for seed in 100..106 {
+        // The slowest axis needs 7 s for the whole of these targets' range.
+        let Walked {
+            outside, missed, ..
+        } = walk(seed, 10_000);
+        println!("seed {seed}: {missed:.1} counts from the targets at most");
+        assert!(outside == 0.0, "seed {seed}: {outside} counts outside");
+        assert!(missed <= 2.0, "seed {seed}: {missed} counts from a target");
     }
 }

@@ -99,3 +99,24 @@ fn a_multiplexer_that_ignores_selections_is_named_before_the_gripper_went_far() 
         Finding::Twins { .. }
     )));
 }
+
+#[test]
+fn another_side_trusts_no_sensor_that_jumped() {
+    let mut bench = following();
+    bench.glove.set_heading(0, core::f32::consts::FRAC_PI_2);
+    bench.run(S);
+    assert!(!bench.app.telemetry().calibration.is_calibrated);
+    bench.release();
+    bench.run(100 * MS);
+    for side in [glove::hand::Side::Left, glove::hand::Side::Right] {
+        let settings = Settings {
+            side,
+            ..Settings::default()
+        };
+        let config = bridge::Config::new(settings).expect("in range");
+        assert!(bench.app.set_config(config).is_ok());
+    }
+    bench.clutch = true;
+    bench.run(3 * S);
+    assert_eq!(bench.state(), State::Holding(HoldReason::NotCalibrated));
+}

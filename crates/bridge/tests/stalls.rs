@@ -82,5 +82,5 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     println!(
         "seed {SEED}: {STALLS} stalls, {commands} first commands, at most {worst:.1} counts from the gripper"
     );
-    assert!(commands > STALLS * 9 / 10, "{commands} commands");
+    assert!(commands > STALLS * 3 / 4, "{commands} commands");
 }

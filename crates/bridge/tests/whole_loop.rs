@@ -481,6 +481,40 @@ fn a_calibration_can_be_taken_back_once() {
 }
 
 #[test]
+fn a_calibration_taken_back_is_worth_no_more_than_it_was_and_nothing_after_a_restart() {
+    let mut bench = Bench::new(Settings::default());
+    bench.ready();
+    let now = bench.clock.now();
+    bench.glove.reset_sensor(0, now);
+    bench.run(5 * S);
+    assert!(!bench.app.telemetry().calibration.is_calibrated);
+    bench.app.calibrate_flat_hand();
+    bench.run(2 * S);
+    assert!(bench.app.telemetry().calibration.is_calibrated);
+    bench.app.undo_calibration();
+    bench.run(S);
+    assert!(!bench.app.telemetry().calibration.is_calibrated);
+    bench.clutch = true;
+    bench.run(2 * S);
+    assert_eq!(bench.state(), State::Holding(HoldReason::NotCalibrated));
+}
+
+#[test]
+fn a_hand_that_bends_by_a_try_at_a_time_is_not_taken_for_flat() {
+    let mut bench = Bench::new(Settings::default());
+    bench.ready();
+    let bent = |pip: f32| core::array::from_fn(|joint| if joint % 5 == 3 { pip } else { 0.0 });
+    for (pip, taken) in [(0.5, true), (1.0, false), (1.45, false)] {
+        bench.set_pose(bent(pip));
+        bench.run(S);
+        bench.app.calibrate_flat_hand();
+        bench.run(3 * S);
+        let newest = bench.app.telemetry().calibration.newest;
+        assert_eq!(newest == Try::Taken, taken, "{pip}: {newest:?}");
+    }
+}
+
+#[test]
 fn a_hand_sensor_that_restarts_ends_the_calibration_and_holds_until_the_next_one() {
     let mut bench = following();
     let now = bench.clock.now();

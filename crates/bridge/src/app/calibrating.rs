@@ -6,8 +6,8 @@ use crate::event::Kind;
 use crate::platform::{Platform, Slot};
 use crate::{Duration, Instant};
 use embedded_io::{Read, ReadReady, Write};
-use glove::hand::Calibration;
 use glove::hand::flat::{FlatHand, Progress};
+use glove::hand::{Calibration, SEGMENT_COUNT};
 use glove::scan::Frame;
 use gripper::Gripper;
 
@@ -17,7 +17,16 @@ pub(super) struct Calibrating {
     /// The try under way.
     flat: Option<FlatHand>,
     /// What the calibration in use replaced: `None` where nothing was replaced yet.
-    before: Option<Option<Calibration>>,
+    before: Option<Replaced>,
+}
+
+/// A calibration that was in use, and what it was worth then.
+#[derive(Debug, Clone, Copy)]
+struct Replaced {
+    calibration: Option<Calibration>,
+    /// How often each sensor had been started when it was made.
+    starts: Option<[u16; SEGMENT_COUNT]>,
+    distrusted: u16,
 }
 
 impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
@@ -39,9 +48,8 @@ where
         if self.is_engaged() {
             return self.end_try(now, Try::Refused(Refusal::Engaged));
         }
-        let straight = Calibration::identity();
-        let reference = self.posture.calibration().unwrap_or(&straight);
-        self.calibrating.flat = Some(FlatHand::start(now, wait, reference));
+        // Always against sensors that sit straight: against the calibration before, a hand could bend by a try at a time.
+        self.calibrating.flat = Some(FlatHand::start(now, wait, &Calibration::identity()));
         self.telemetry.calibration.newest = Try::Waiting;
     }
 
@@ -64,7 +72,13 @@ where
         let Some(before) = self.calibrating.before.take() else {
             return self.end_try(now, Try::Refused(Refusal::NothingBefore));
         };
-        self.use_calibration(before);
+        // A sensor that jumped since has jumped for the old one, too; one that restarted is seen by its starts.
+        let distrusted = before.distrusted | self.posture.distrusted();
+        self.posture.calibrate(before.calibration);
+        self.sensors.starts = before.starts;
+        for segment in (0..SEGMENT_COUNT).filter(|segment| distrusted >> segment & 1 == 1) {
+            self.posture.distrust(segment);
+        }
         self.end_try(now, Try::Undone);
     }
 
@@ -74,15 +88,15 @@ where
     }
 
     fn replace_calibration(&mut self, now: Instant, calibration: Calibration) {
-        self.calibrating.before = Some(self.posture.calibration().copied());
-        self.use_calibration(Some(calibration));
-        self.end_try(now, Try::Taken);
-    }
-
-    /// A calibration belongs to the headings the sensors have now; at least their first start has happened or will.
-    fn use_calibration(&mut self, calibration: Option<Calibration>) {
-        self.posture.calibrate(calibration);
+        self.calibrating.before = Some(Replaced {
+            calibration: self.posture.calibration().copied(),
+            starts: self.sensors.starts,
+            distrusted: self.posture.distrusted(),
+        });
+        self.posture.calibrate(Some(calibration));
+        // It belongs to the headings the sensors have now; at least their first start has happened or will.
         self.sensors.starts = Some(self.scanner.counters().starts.map(|starts| starts.max(1)));
+        self.end_try(now, Try::Taken);
     }
 
     fn end_try(&mut self, now: Instant, end: Try) {

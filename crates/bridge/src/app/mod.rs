@@ -215,8 +215,7 @@ where
             return Err(config);
         }
         if config.settings().side != self.config().settings().side {
-            self.posture =
-                Posture::new(config.settings().side, self.posture.calibration().copied());
+            self.posture.set_side(config.settings().side);
         }
         self.supervisor.configure(config);
         Ok(())
@@ -235,7 +234,12 @@ where
     /// Where the clutch is. Where it is lost or expired the gripper is held, and [`App::is_engaged`] stays true until somebody
     /// releases.
     pub fn clutch(&self) -> Position {
-        self.clutch.position(self.telemetry.now)
+        let now = match self.clutch {
+            // One from after the newest step has just come.
+            Clutch::Closed { beat, .. } => beat.max(self.telemetry.now),
+            _ => self.telemetry.now,
+        };
+        self.clutch.position(now)
     }
 
     /// What is known after the newest step.

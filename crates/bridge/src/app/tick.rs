@@ -209,7 +209,9 @@ where
         counters.glove = *self.scanner.counters();
         counters.gripper = self.gripper.counters();
         bump(&mut counters.steps);
-        if fresh && self.order.is_some_and(|order| order.follows) {
+        // Motion that begins between two frames rests on the one before.
+        let another = fresh || !output.before.is_moving();
+        if another && self.order.is_some_and(|order| order.follows) {
             bump(&mut counters.following_frames);
         }
         if let Some(late) = output.late {

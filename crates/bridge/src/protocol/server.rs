@@ -116,7 +116,8 @@ impl<S: Read + ReadReady + Write> Server<S> {
         self.board = board;
     }
 
-    /// Goes on with whatever is under way: sends, takes bytes, does at most one request or a piece of one. Never waits.
+    /// Goes on with whatever is under way: sends, takes bytes, does at most one request or a piece of one. Never waits. `now`
+    /// is read from the clock for this very call: an older time would take what came in a stall for fresh.
     ///
     /// A release is obeyed at once, whatever else is under way. After more than 100 ms without a poll nothing else of what
     /// lies in the port is done: hosts ask again.
@@ -125,7 +126,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
     /// while the clutch is closed.
     pub fn poll<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) -> Outcome {
         let before = self.polled.replace(now).unwrap_or(now);
-        self.is_stale |= !timing::is_within(now, before, timing::LONGEST_GAP);
+        if !timing::is_within(now, before, timing::LONGEST_GAP) {
+            // A release among it was obeyed when it came.
+            self.pending.clear();
+            self.is_stale = true;
+        }
         let sending = self.send();
         if self.rebooting && !sending {
             return Outcome::Reboot;
@@ -212,10 +217,13 @@ impl<S: Read + ReadReady + Write> Server<S> {
         if let Call::Hello { version } = &request.call {
             return Some(self.hello(now, request, *version, app));
         }
+        let is_late = self.is_late(request);
         match &mut self.session {
             Some(session) if session.id == request.session => {
                 session.heard = now;
-                session.newest = request.sequence;
+                if !is_late {
+                    session.newest = request.sequence;
+                }
             }
             // Obeyed when it came.
             _ if matches!(request.call, Call::Release) => {

@@ -10,8 +10,7 @@ pub(super) struct Believed<const X: usize> {
     plausibility: Plausibility<X>,
     /// The newest status whose positions can be true.
     status: Option<Status<X>>,
-    stands: Option<Stands<X>>,
-    follows_echo: Echo<X>,
+    tracks: [Option<Track>; X],
 }
 
 /// What a status is worth.
@@ -23,18 +22,13 @@ pub(super) struct Judged<const X: usize> {
     pub implausible: Option<u8>,
 }
 
-/// Axes that do not move although they are told to.
+/// Since when each axis has stood, and where; since when it has echoed the same while it was told another.
 #[derive(Debug, Clone, Copy)]
-struct Stands<const X: usize> {
-    position: [u8; X],
-    since: Instant,
-}
-
-/// Commands that are not echoed.
-#[derive(Debug, Clone, Copy)]
-struct Echo<const X: usize> {
-    echoed: [u8; X],
-    since: Option<Instant>,
+struct Track {
+    position: u8,
+    stands: Instant,
+    echo: u8,
+    echoes: Instant,
 }
 
 impl<const X: usize> Believed<X> {
@@ -48,11 +42,7 @@ impl<const X: usize> Believed<X> {
         Self {
             plausibility: Plausibility::new(speed),
             status: None,
-            stands: None,
-            follows_echo: Echo {
-                echoed: [0; X],
-                since: None,
-            },
+            tracks: [None; X],
         }
     }
 
@@ -82,53 +72,60 @@ impl<const X: usize> Believed<X> {
         }
     }
 
-    /// The first axis that stands although it has been told for [`timing::STANDS_AFTER`] to be elsewhere, with nothing in its
-    /// way that it says. A software limit, where an axis says that it is at its position, is none.
-    pub fn stands(&mut self, now: Instant, status: &Status<X>, motion: &Motion<X>) -> Option<u8> {
-        let waits = |axis: usize| {
-            status.contact[axis] == Contact::Moving
-                && motion.position[axis].abs_diff(status.position[axis]) > STILL
-        };
-        let before = self.stands.get_or_insert(Stands {
-            position: status.position,
-            since: now,
-        });
-        let moved =
-            (0..X).any(|axis| before.position[axis].abs_diff(status.position[axis]) > STILL);
-        let stuck = (0..X).find(|&axis| waits(axis));
-        if moved || stuck.is_none() {
-            *before = Stands {
-                position: status.position,
-                since: now,
-            };
+    /// Looks whether each axis does what `motion` tells it; call it in every step of motion.
+    pub fn follow(&mut self, now: Instant, status: &Status<X>, motion: &Motion<X>) {
+        let said = status.position.iter().zip(status.echo);
+        let told = motion.position.iter().zip(said);
+        for (track, (told, (&position, echo))) in self.tracks.iter_mut().zip(told) {
+            let track = track.get_or_insert(Track {
+                position,
+                stands: now,
+                echo,
+                echoes: now,
+            });
+            if track.position.abs_diff(position) > STILL || told.abs_diff(position) <= STILL {
+                (track.position, track.stands) = (position, now);
+            }
+            if track.echo != echo || echo == *told {
+                (track.echo, track.echoes) = (echo, now);
+            }
         }
-        let long = elapsed(now, before.since) >= timing::STANDS_AFTER;
-        stuck
-            .filter(|_| long)
-            .and_then(|axis| u8::try_from(axis).ok())
     }
 
-    /// Whether the gripper has for [`timing::ECHO_AFTER`] repeated one and the same position while it was told others.
-    pub fn ignores(&mut self, now: Instant, status: &Status<X>, motion: &Motion<X>) -> bool {
-        let echo = &mut self.follows_echo;
-        let follows = status.echo != echo.echoed || status.echo == motion.position;
-        if follows || echo.since.is_none() {
-            *echo = Echo {
-                echoed: status.echo,
-                since: Some(now),
+    /// The first axis that has stood for [`timing::STANDS_AFTER`] although it is told to be elsewhere, with nothing in its way
+    /// that it says. Near its ends a finger may stand at a software limit, and a scissor anywhere ("at position" then).
+    pub fn stands(&self, now: Instant, status: &Status<X>) -> Option<u8> {
+        let stuck = |axis: usize, track: &Track| {
+            let free = match status.contact.get(axis) {
+                Some(Contact::Moving) => true,
+                Some(Contact::AtPosition) => axis != SCISSOR && FREE.contains(&track.position),
+                _ => false,
             };
-        }
-        echo.since
-            .is_some_and(|since| elapsed(now, since) >= timing::ECHO_AFTER)
+            free && elapsed(now, track.stands) >= timing::STANDS_AFTER
+        };
+        self.tracks
+            .iter()
+            .enumerate()
+            .find(|(axis, track)| track.as_ref().is_some_and(|track| stuck(*axis, track)))
+            .and_then(|(axis, _)| u8::try_from(axis).ok())
+    }
+
+    /// Whether an axis has for [`timing::ECHO_AFTER`] repeated one and the same position while it was told others.
+    pub fn ignores(&self, now: Instant) -> bool {
+        let ignores = |track: &Track| elapsed(now, track.echoes) >= timing::ECHO_AFTER;
+        self.tracks.iter().flatten().any(ignores)
     }
 
     /// Nothing is told now: standing still is right.
     pub fn rest(&mut self) {
-        self.stands = None;
-        self.follows_echo.since = None;
+        self.tracks = [None; X];
     }
 }
 
+/// The 3-Finger gripper's scissor, whose range follows the fingers.
+const SCISSOR: usize = 3;
+/// Where no software limit of a finger lies: fully open reads 6 to 7 (hardware note, section 1), closed some counts below 255.
+const FREE: core::ops::RangeInclusive<u8> = 16..=234;
 /// Counts by which a standing axis may flicker.
 const STILL: u8 = gripper::travel::FLICKER;
 

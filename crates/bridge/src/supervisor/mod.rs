@@ -292,8 +292,9 @@ impl<const X: usize> Supervisor<X> {
             self.believed.rest();
             return None;
         };
-        self.ignored = self.believed.ignores(now, status, motion);
-        self.believed.stands(now, status, motion)
+        self.believed.follow(now, status, motion);
+        self.ignored = self.believed.ignores(now);
+        self.believed.stands(now, status)
     }
 
     /// What a change of state sets up.

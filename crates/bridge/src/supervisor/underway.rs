@@ -29,10 +29,12 @@ impl<const X: usize> Underway<X> {
 
     /// A command was decided.
     pub fn decided(&mut self, now: Instant, position: [u8; X]) {
-        if let Some((at, newest)) = self.commands.back_mut()
-            && *newest == position
+        // A repetition keeps the time of the first: from then on the gripper has been told.
+        if self
+            .commands
+            .back()
+            .is_some_and(|(_, newest)| *newest == position)
         {
-            *at = now;
             return;
         }
         if self.commands.is_full()

@@ -109,7 +109,7 @@ impl Host {
 
     pub fn turn(&mut self) {
         self.bench.step();
-        let now = self.bench.app.telemetry().now;
+        let now = self.bench.clock.now();
         self.outcome = self.server.poll(now, &mut self.bench.app);
     }
 

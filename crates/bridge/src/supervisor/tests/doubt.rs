@@ -117,9 +117,41 @@ fn an_axis_that_stands_although_it_is_told_to_move_is_told_within_two_seconds() 
     while bench.tick().stands.is_none() {
         assert!(bench.now - start < 2_000 * MS);
     }
-    // A software limit is none: there it says that it is at its position.
-    bench.status().contact = [Contact::AtPosition; 4];
-    assert_eq!(bench.ticks(300).stands, None);
+}
+
+#[test]
+fn a_finger_that_stands_is_told_while_the_others_move_and_a_software_limit_is_not() {
+    let mut bench = following();
+    bench.ticks(300);
+    let start = bench.now;
+    let stuck = bench.status().position[2];
+    bench.output = [60.0, 60.0, 20.0, 100.0];
+    let told = loop {
+        bench.tick();
+        // Finger C is jammed, and says that it is at its position.
+        bench.status().position[2] = stuck;
+        if (bench.now / (400 * MS)) % 2 == 0 {
+            bench.output[0] = 60.0;
+        } else {
+            bench.output[0] = 160.0;
+        }
+        if let Some(axis) = bench.last.unwrap().stands {
+            break axis;
+        }
+        assert!(bench.now - start < 2_500 * MS);
+    };
+    assert_eq!(told, 2);
+    // The scissor's range follows the fingers: at its position it may stand anywhere.
+    let mut bench = following();
+    bench.ticks(300);
+    let here = bench.status().position;
+    bench.output = here.map(f32::from);
+    bench.output[3] = 60.0;
+    for _ in 0..300 {
+        bench.tick();
+        bench.status().position[3] = here[3];
+        assert_eq!(bench.last.unwrap().stands, None);
+    }
 }
 
 #[test]
