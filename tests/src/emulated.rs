@@ -124,7 +124,7 @@ pub fn hold_clutch(link: &mut HostLink, time: Duration) -> Vec<State> {
         match link.heartbeat(epoch).expect("taken") {
             Heartbeat::Kept(status) => states.push(status.state),
             Heartbeat::Unanswered => {}
-            Heartbeat::Refused => panic!("the clutch opened by itself: {:?}", link.status()),
+            Heartbeat::Refused(why) => panic!("{why}: {:?}", link.status()),
         }
         std::thread::sleep(BEAT);
     }

@@ -11,6 +11,7 @@ pub use table::{write_head, write_row};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::clutch::HeartbeatRefusal;
 use bridge::protocol::message::{Counters, Sample, Status};
 use bridge::{Epoch, State};
 use gripper::{Activation, Fault};
@@ -19,10 +20,10 @@ use crate::failure::{Failure, OrFail};
 use crate::host_link::{Error, Heartbeat, HostLink};
 use crate::interrupt::Interrupt;
 use crate::live::{Axis, Finger, Key, Live, View};
-use crate::run::{End, clutch_expired};
+use crate::run::{End, Ending, first_failure};
 use crate::stats::{Percentiles, Rate};
 use crate::stopped::Stopped;
-use crate::words;
+use crate::{out, words};
 
 /// Pause between two heartbeats, spent listening.
 const HEARTBEAT: Duration = Duration::from_millis(100);
@@ -55,24 +56,31 @@ pub struct Options {
 pub struct Watched {
     /// Its numbers.
     pub summary: Summary,
-    /// Why it ended.
-    pub end: End,
     /// How the gripper was left, where the clutch was closed.
     pub stopped: Option<Stopped>,
-    /// The clutch opened by itself, and nobody closed it again.
-    pub expired: bool,
+    /// Why it ended.
+    end: Result<End>,
+    /// How everything was then; `None` where the bridge never said.
+    ending: Option<Ending>,
 }
 
 impl Watched {
-    /// The failure that a run is which nobody attended: its clutch opened by itself.
+    /// How the gripper was left, in words, where it is safe.
+    pub fn left(&self) -> Option<&'static str> {
+        self.stopped.and_then(|stopped| stopped.judge().ok())
+    }
+
+    /// The judgement. Whether the gripper may still move comes first, then what ended the watch, then what was broken at
+    /// its end.
     ///
     /// # Errors
-    /// That one.
-    pub fn attended(&self) -> Result<()> {
-        if !self.expired {
-            return Ok(());
-        }
-        Err(clutch_expired().into())
+    /// The first of the failures; the others are noted before it.
+    pub fn judge(self) -> Result<End> {
+        let stopped = self
+            .stopped
+            .map_or(Ok(()), |stopped| stopped.judge().map(drop));
+        let ending = self.ending.map_or(Ok(()), Ending::judge);
+        first_failure(stopped, self.end, [ending])
     }
 }
 
@@ -87,6 +95,8 @@ pub struct Watch<'a> {
     engaged: bool,
     /// It opened by itself, and was not closed again.
     expired: bool,
+    /// Somebody can press keys.
+    attended: bool,
     missed: u32,
     status: Option<Status>,
     sample: Option<Sample>,
@@ -110,6 +120,7 @@ impl<'a> Watch<'a> {
             epoch: None,
             engaged: false,
             expired: false,
+            attended: false,
             missed: 0,
             status: None,
             sample: None,
@@ -129,7 +140,7 @@ impl<'a> Watch<'a> {
     /// `each` is given every sample.
     ///
     /// # Errors
-    /// Where the gripper may still move; what ended the line, the bridge's refusal, the terminal's or the file's fault.
+    /// The line's fault before the watch began; what goes wrong later is part of what is left.
     pub fn run(
         mut self,
         options: &Options,
@@ -138,22 +149,30 @@ impl<'a> Watch<'a> {
         let before = self.link.counters().map_err(Failure::from)?;
         self.link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
         self.started = Instant::now();
-        let watched = self.watch(options, each);
+        let end = self.watch(options, each);
+        let ending = self.ending();
         let seconds = self.started.elapsed().as_secs_f64();
         let stopped = self.engaged.then(|| stop(self.link));
-        // Whether the gripper may still move comes before whatever else went wrong.
-        if let Some(stopped) = &stopped {
-            stopped.judge()?;
-        }
-        let end = watched?;
-        self.link.telemetry(0).map_err(Failure::from)?;
-        let after = self.link.counters().map_err(Failure::from)?;
+        let known = self.counted.map_or(before, |(_, counters)| counters);
+        let after = self.link.counters().unwrap_or(known);
+        // Nobody listens any more, whether the bridge hears it or not.
+        let _ = self.link.telemetry(0);
         Ok(Watched {
             summary: self.summary(seconds, &before, &after),
-            end,
             stopped,
-            expired: self.expired,
+            end,
+            ending,
         })
+    }
+
+    fn ending(&self) -> Option<Ending> {
+        let status = self.status.as_ref()?;
+        Some(Ending::new(
+            status.state,
+            status.glove_answers,
+            status.gripper.is_some(),
+            self.expired && !self.attended,
+        ))
     }
 
     fn watch(
@@ -164,6 +183,11 @@ impl<'a> Watch<'a> {
         let terminal = || "the terminal does not work".to_owned();
         let next = "`gauntlet … | cat`, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
+        let suspend = self.interrupt.catch_suspend().or_fail(
+            || "Ctrl-Z cannot be caught".to_owned(),
+            "ending other programs: the system lacks descriptors",
+        )?;
+        self.attended = live.interactive();
         if options.engage {
             self.engage()?;
         }
@@ -171,7 +195,10 @@ impl<'a> Watch<'a> {
         loop {
             let beat = Instant::now();
             if let Some(epoch) = self.epoch {
-                self.heartbeat(epoch)?;
+                // Nobody sees the view: as if nobody were there.
+                if !live.unseen() {
+                    self.heartbeat(epoch)?;
+                }
             } else if asked_status.is_none_or(|at| at.elapsed() >= STATUS_EVERY) {
                 asked_status = Some(beat);
                 self.status = Some(self.link.status().map_err(Failure::from)?);
@@ -189,7 +216,11 @@ impl<'a> Watch<'a> {
                 self.obey(key, options)?;
             }
             live.show(|| self.view(options)).or_fail(terminal, next)?;
-            if self.interrupt.asked() {
+            if suspend.asked() {
+                self.release()?;
+                live.aside(|| suspend.stop()).or_fail(terminal, next)?;
+            }
+            if self.interrupt.asked() || out::closed() {
                 return Ok(End::Asked);
             }
             if options
@@ -203,10 +234,19 @@ impl<'a> Watch<'a> {
 
     /// Closes the clutch: an act of a person.
     fn engage(&mut self) -> Result<()> {
+        // Also where the answer is lost: the bridge may have closed it.
+        (self.engaged, self.epoch) = (true, None);
         let (epoch, status) = self.link.engage().map_err(Failure::from)?;
         self.epoch = Some(epoch);
         self.status = Some(status);
-        (self.engaged, self.expired, self.missed) = (true, false, 0);
+        (self.expired, self.missed) = (false, 0);
+        Ok(())
+    }
+
+    /// Opens the clutch, for a person.
+    fn release(&mut self) -> Result<()> {
+        (self.epoch, self.expired) = (None, false);
+        self.status = Some(self.link.release().map_err(Failure::from)?);
         Ok(())
     }
 
@@ -216,7 +256,10 @@ impl<'a> Watch<'a> {
                 self.missed = 0;
                 self.status = Some(status);
             }
-            Heartbeat::Refused => (self.epoch, self.expired) = (None, true),
+            // Somebody else's release, or their closing, is an act: nothing went wrong.
+            Heartbeat::Refused(why) => {
+                (self.epoch, self.expired) = (None, why == HeartbeatRefusal::Expired);
+            }
             Heartbeat::Unanswered => self.missed += 1,
         }
         if self.missed >= MISSED_BEATS {
@@ -250,15 +293,8 @@ impl<'a> Watch<'a> {
     fn obey(&mut self, key: Key, options: &Options) -> Result<()> {
         match key {
             Key::End => self.interrupt.ask(),
-            Key::Clutch if options.engage && self.epoch.is_some() => {
-                self.epoch = None;
-                self.status = Some(self.link.release().map_err(Failure::from)?);
-            }
-            Key::Clutch if options.engage => self.engage()?,
-            Key::Open if self.epoch.is_some() => {
-                self.epoch = None;
-                self.status = Some(self.link.release().map_err(Failure::from)?);
-            }
+            Key::Clutch if options.engage && self.epoch.is_none() => self.engage()?,
+            Key::Clutch | Key::Open if options.engage => self.release()?,
             Key::Clutch | Key::Open | Key::Calibrate => {}
         }
         Ok(())
@@ -301,9 +337,9 @@ impl<'a> Watch<'a> {
         let grown = after.since(before);
         Summary {
             seconds,
-            frames: grown.frames,
-            following_frames: grown.following_frames,
-            answered_frames: grown.answered_frames,
+            glove_frames: grown.frames,
+            frames_following: grown.following_frames,
+            frames_answered: grown.answered_frames,
             commands: grown.commands,
             gripper_cycles: grown.statuses,
             gripper_errors: grown.gripper_errors,

@@ -57,7 +57,7 @@ impl Clock {
 }
 
 /// Time since the computer started, suspends included where the system counts them.
-fn since_boot() -> Duration {
+pub fn since_boot() -> Duration {
     #[cfg(any(target_os = "linux", target_os = "android"))]
     const CLOCK: ClockId = ClockId::Boottime;
     #[cfg(not(any(target_os = "linux", target_os = "android")))]

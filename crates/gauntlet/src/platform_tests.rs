@@ -74,3 +74,27 @@ fn calendar_time_and_loop_time_advance_together() {
     let first = clock.wall_ns(Instant::from_ticks(0));
     assert_eq!(clock.wall_ns(Instant::from_ticks(1_500)) - first, 1_500_000);
 }
+
+#[test]
+fn a_suspend_is_seen_by_a_clock_that_goes_on_in_it() {
+    use std::sync::atomic::{AtomicU64, Ordering};
+    static SLEPT: AtomicU64 = AtomicU64::new(0);
+    // The computer's time, and the time it slept, which `std::time::Instant` does not count.
+    fn source() -> std::time::Duration {
+        let awake = std::time::Duration::from_secs(1_000);
+        awake + std::time::Duration::from_secs(SLEPT.load(Ordering::Relaxed))
+    }
+    let clock = Clock::from_source(source);
+    let mut pc = Pc::new(clock, [], Interrupt::never().unwrap());
+    assert_eq!(pc.now().as_ticks(), 0);
+    SLEPT.store(600, Ordering::Relaxed);
+    assert_eq!(
+        pc.now().as_ticks(),
+        600_000_000,
+        "ten minutes with the lid closed"
+    );
+    // And the tool's own goes on at least as `Instant` does.
+    let (tool, start) = (Clock::start(), std::time::Instant::now());
+    std::thread::sleep(std::time::Duration::from_millis(20));
+    assert!(tool.now().as_ticks() + 1_000 >= start.elapsed().as_micros() as u64);
+}

@@ -26,7 +26,7 @@ use crate::session_log::SessionLog;
 use crate::{note, out};
 use shown::Shown;
 
-pub use ending::{Ending, Finished, clutch_expired};
+pub use ending::{Ending, Finished, first_failure};
 pub use numbers::Numbers;
 pub use replies::Failed;
 pub use summary::Summary;

@@ -376,6 +376,11 @@ impl Worker {
                 kind: event.kind,
             });
         }
+        // An activation that has ended is over, whatever the gripper does later.
+        let ready = telemetry.status.is_some_and(|status| {
+            status.activation == Activation::Ready && telemetry.state.is_moving()
+        });
+        self.activation_asked &= !ready;
         self.seen = Seen {
             frame: telemetry.frame_sequence,
             sent: telemetry.sent_sequence,

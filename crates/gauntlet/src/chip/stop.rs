@@ -13,6 +13,9 @@ const PAUSE: Duration = Duration::from_millis(30);
 /// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.
 const STATUSES: u32 = 3;
 
+/// Statuses over which a gripper that is told nothing must not have moved: half a second.
+const STANDS: u32 = 60;
+
 /// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on.
 pub(super) fn stop(link: &mut HostLink) -> Stopped {
     match confirmed(link) {
@@ -22,17 +25,19 @@ pub(super) fn stop(link: &mut HostLink) -> Stopped {
 }
 
 fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
-    link.release()?;
+    let released_us = link.release()?.now_us;
     let at_release = link.counters()?;
     if at_release.commands == 0 {
         return Ok(Stopped::Untouched);
     }
     let end = Instant::now() + Duration::from_micros(HOLD_WAIT.as_micros());
     let mut command = None;
+    let mut stood = None;
     loop {
         for sample in link.listen(PAUSE)? {
             // What the gripper is told now that the clutch is open.
-            command = (sample.state == State::Idle).then_some(sample.command);
+            let now = sample.state == State::Idle && sample.now_us > released_us;
+            command = now.then_some(sample.command);
         }
         let status = link.status()?;
         let counters = link.counters()?;
@@ -41,9 +46,17 @@ fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
             if gripper.activation == Activation::Activating {
                 return Ok(Stopped::Activating);
             }
-            // Told nothing: it goes nowhere by itself, and writing could start it.
-            let silent = command.as_ref().is_some_and(|command| command.is_empty());
-            if silent || command.as_ref() == Some(&gripper.echo) {
+            if command.as_ref() == Some(&gripper.echo) {
+                return Ok(Stopped::Held);
+            }
+            // Told nothing: it goes nowhere by itself, or it opens by itself, which only its positions tell.
+            let (since, position) =
+                stood.get_or_insert((counters.statuses, gripper.position.clone()));
+            if *position != gripper.position {
+                stood = None;
+            } else if counters.statuses.wrapping_sub(*since) >= STANDS
+                && command.as_ref().is_some_and(|command| command.is_empty())
+            {
                 return Ok(Stopped::Held);
             }
         }

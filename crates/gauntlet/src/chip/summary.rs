@@ -10,11 +10,11 @@ pub struct Summary {
     /// How long, seconds.
     pub seconds: f64,
     /// Frames the bridge took from the glove.
-    pub frames: u32,
+    pub glove_frames: u32,
     /// Frames that the gripper was to follow.
-    pub following_frames: u32,
+    pub frames_following: u32,
     /// Of those, frames answered with a command that follows the hand.
-    pub answered_frames: u32,
+    pub frames_answered: u32,
     /// Commands that left the bridge.
     pub commands: u32,
     /// Statuses of the gripper.
@@ -44,14 +44,14 @@ impl Summary {
         vec![
             format!(
                 "rates      glove {:.1} scans/s ({}), gripper {:.1} cycles/s ({})",
-                rate(self.frames),
-                self.frames,
+                rate(self.glove_frames),
+                self.glove_frames,
                 rate(self.gripper_cycles),
                 self.gripper_cycles
             ),
             format!(
                 "answered   {} of {} glove frames that came while following got a gripper command",
-                self.answered_frames, self.following_frames
+                self.frames_answered, self.frames_following
             ),
             format!(
                 "latency    oldest sample to command, of {} telemetry samples: p50 {}, p99 {}",

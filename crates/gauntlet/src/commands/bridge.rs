@@ -11,7 +11,7 @@ use gripper::Activation;
 use serde_json::json;
 
 use super::flash::slot_lines;
-use crate::chip::{Options, Watch, standing_faults, write_head, write_row};
+use crate::chip::{Options, Watch, Watched, standing_faults, write_head, write_row};
 use crate::cli::{Bridge, BridgeAt, BridgeVerb};
 use crate::failure::{Failure, OrFail};
 use crate::host_link::{Error, HostLink};
@@ -200,11 +200,10 @@ fn engage(
         quiet: at.json,
     };
     let watched = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
-    if let Some(stopped) = watched.stopped {
-        tell.say(format_args!("the clutch is open: {}", stopped.judge()?));
+    if let Some(left) = watched.left() {
+        tell.say(format_args!("the clutch is open: {left}"));
     }
-    finish(at, &tell, &watched.summary)?;
-    watched.attended()
+    finish(at, &tell, watched)
 }
 
 fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
@@ -303,7 +302,7 @@ fn monitor(at: &BridgeAt, seconds: Option<Duration>, interrupt: &Interrupt) -> R
         quiet: at.json,
     };
     let watched = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
-    finish(at, &tell, &watched.summary)
+    finish(at, &tell, watched)
 }
 
 fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interrupt) -> Result<()> {
@@ -336,28 +335,30 @@ fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interr
         .into_inner()
         .map_err(|error| error.into_error())
         .and_then(|file| file.sync_all());
-    if watched.is_err() && rows == 0 {
+    if rows == 0 {
         // An empty file would stand in the way of the same command again.
         let _ = std::fs::remove_file(path);
     }
     written.or_fail(name, "room on the disk")?;
-    let summary = watched?.summary;
+    let watched = watched?;
     tell.say(format_args!(
         "log        {} with {rows} poses",
         path.display()
     ));
-    finish(at, &tell, &summary)
+    finish(at, &tell, watched)
 }
 
-fn finish(at: &BridgeAt, tell: &Tell, summary: &crate::chip::Summary) -> Result<()> {
+/// The numbers, then the judgement over all of it.
+fn finish(at: &BridgeAt, tell: &Tell, watched: Watched) -> Result<()> {
     if at.json {
-        return out::json(summary);
+        out::json(&watched.summary)?;
+    } else {
+        let lines = watched.summary.lines();
+        lines
+            .iter()
+            .for_each(|line| tell.say(format_args!("{line}")));
     }
-    summary
-        .lines()
-        .iter()
-        .for_each(|line| tell.say(format_args!("{line}")));
-    Ok(())
+    watched.judge().map(drop)
 }
 
 fn select(at: &BridgeAt, slot: u8) -> Result<()> {

@@ -7,7 +7,7 @@ use rig::pty::Handle;
 use serde_json::json;
 
 use super::{bridge, demo, flash};
-use crate::chip::{Options, Summary, Watch, Watched};
+use crate::chip::{Options, Watch, Watched};
 use crate::cli::Demo;
 use crate::emulator::{Emulator, Setup, find_firmware};
 use crate::failure::Failure;
@@ -53,6 +53,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let Some(watched) = driven else {
         return Ok(());
     };
+    let moved = watched.summary.first_motion_s.is_some();
     if options.json {
         out::json(&json!({
             "motion": motion.describe(),
@@ -65,8 +66,8 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             "run": watched.summary,
         }))?;
     } else {
-        if let Some(stopped) = watched.stopped {
-            tell.say(format_args!("summary    {}", stopped.judge()?));
+        if let Some(left) = watched.left() {
+            tell.say(format_args!("summary    {left}"));
         }
         watched
             .summary
@@ -75,9 +76,8 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             .for_each(|line| tell.say(format_args!("{line}")));
         tell.say(format_args!("map        {}", outcome.quality.line()));
     }
-    watched.attended()?;
-    match watched.end {
-        End::Time => judge(&watched.summary),
+    match watched.judge()? {
+        End::Time => judge(moved),
         End::Asked => Ok(()),
     }
 }
@@ -143,8 +143,8 @@ fn wait_for_frames(link: &mut HostLink, interrupt: &Interrupt) -> Result<bool> {
 }
 
 /// A demo in which the gripper did not move has failed, whatever was printed.
-fn judge(summary: &Summary) -> Result<()> {
-    if summary.first_motion_s.is_some() {
+fn judge(moved: bool) -> Result<()> {
+    if moved {
         return Ok(());
     }
     Err(Failure::new(

@@ -2,6 +2,7 @@
 
 use std::time::{Duration, Instant};
 
+use bridge::clutch::HeartbeatRefusal;
 use bridge::protocol::message::{Answer, Call, Counters, Refusal, Status};
 
 use super::{Epoch, Error, HostLink, as_status, confused};
@@ -9,13 +10,16 @@ use super::{Epoch, Error, HostLink, as_status, confused};
 /// For a heartbeat: the next one is due then.
 const HEARTBEAT_WAIT: Duration = Duration::from_millis(100);
 
+/// With less time than this an answer cannot come.
+const LEAST_WAIT: Duration = Duration::from_millis(20);
+
 /// What came of a heartbeat.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Heartbeat {
     /// The clutch stays closed.
     Kept(Status),
     /// The clutch is open, or was closed anew: only an act of a person closes it.
-    Refused,
+    Refused(HeartbeatRefusal),
     /// No answer came in 100 ms: say it again.
     Unanswered,
 }
@@ -43,7 +47,7 @@ impl HostLink {
             Ok(Answer::Status(status)) => Ok(Heartbeat::Kept(status)),
             Ok(other) => Err(confused(&other)),
             Err(Error::Silent { .. }) => Ok(Heartbeat::Unanswered),
-            Err(Error::Refused(Refusal::Heartbeat(_))) => Ok(Heartbeat::Refused),
+            Err(Error::Refused(Refusal::Heartbeat(why))) => Ok(Heartbeat::Refused(why)),
             Err(error) => Err(error),
         }
     }
@@ -62,6 +66,9 @@ impl HostLink {
     /// The line's fault, or the bridge's refusal.
     pub fn counters_by(&mut self, end: Instant) -> Result<Option<Counters>, Error> {
         let wait = end.saturating_duration_since(Instant::now());
+        if wait < LEAST_WAIT {
+            return Ok(None);
+        }
         match self.ask(&Call::Counters, wait, 1) {
             Ok(Answer::Counters(counters)) => Ok(Some(counters)),
             Ok(other) => Err(confused(&other)),

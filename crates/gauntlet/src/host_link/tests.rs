@@ -421,7 +421,7 @@ fn counters_that_do_not_come_cost_no_heartbeat() {
         let mut link = HostLink::connect(address).unwrap();
         let end = Instant::now() + Duration::from_millis(50);
         assert_eq!(link.counters_by(end), Ok(None));
-        assert_eq!(link.heartbeat(3), Ok(Heartbeat::Refused));
+        assert_eq!(link.heartbeat(3), Ok(Heartbeat::Refused(Expired)));
     });
     let names: Vec<&str> = heard.iter().map(|(_, name)| name.as_str()).collect();
     assert_eq!(names, ["Hello", "Counters", "Heartbeat"], "asked once");

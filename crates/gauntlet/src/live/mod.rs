@@ -18,6 +18,7 @@ pub use draw::draw;
 pub use small::LEAST;
 pub use view::{Axis, Finger, View};
 
+use crate::platform::since_boot;
 use crate::{out, say};
 use keys::{Keyboard, hung_up};
 use raw::Raw;
@@ -28,6 +29,9 @@ const DRAW_EVERY: Duration = Duration::from_millis(80);
 const LINE_EVERY: Duration = Duration::from_secs(1);
 /// A view that was not taken for so long is one that nobody sees.
 const UNSEEN: Duration = Duration::from_millis(250);
+
+/// Keys that came while nobody looked for longer than this are old.
+const LOOKED: Duration = Duration::from_millis(300);
 
 /// What a person asked for with a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -95,8 +99,21 @@ fn empty(area: Rect) -> std::io::Result<Terminal<CrosstermBackend<out::Screen>>>
 pub struct Live {
     target: Target,
     shown: Option<Instant>,
+    /// When keys were looked for last, since the computer's start.
+    looked: Option<Duration>,
     /// Whether somebody sits at a terminal, who may close it.
     terminal: bool,
+}
+
+/// Keys that were pressed before anybody looked, as what is safe: whoever pressed space then may have meant to open.
+fn safe(keys: Vec<Key>) -> Vec<Key> {
+    keys.into_iter()
+        .filter(|key| *key != Key::Calibrate)
+        .map(|key| match key {
+            Key::Clutch => Key::Open,
+            key => key,
+        })
+        .collect()
 }
 
 impl Live {
@@ -117,6 +134,7 @@ impl Live {
         Ok(Self {
             target,
             shown: None,
+            looked: None,
             terminal,
         })
     }
@@ -167,11 +185,15 @@ impl Live {
     /// # Errors
     /// None; kept for views that have any.
     pub fn keys(&mut self) -> std::io::Result<Vec<Key>> {
-        Ok(match &mut self.target {
+        let now = since_boot();
+        let looked = self.looked.replace(now);
+        let old = looked.is_none_or(|before| now.saturating_sub(before) > LOOKED);
+        let keys = match &mut self.target {
             Target::Drawn(drawn) => drawn.keyboard.read(Instant::now()),
             _ if self.terminal && hung_up(&std::io::stdin()) => vec![Key::End],
             _ => Vec::new(),
-        })
+        };
+        Ok(if old { safe(keys) } else { keys })
     }
 
     /// Gives the terminal back while `stop` stops this program, and takes it again when it goes on.

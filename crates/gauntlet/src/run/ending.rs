@@ -22,18 +22,31 @@ pub struct Ending {
 }
 
 impl Ending {
-    /// From what was known last.
-    pub(super) fn of(snapshot: &Snapshot, unattended: bool) -> Self {
+    /// From what was known last. `unattended`: the clutch opened by itself, and nobody was there to see it.
+    pub fn new(state: State, glove_answers: bool, gripper_answers: bool, unattended: bool) -> Self {
         Self {
+            faulted: Some(state).filter(|state| matches!(state, State::Faulted(_))),
             unattended,
-            faulted: Some(snapshot.state).filter(|state| matches!(state, State::Faulted(_))),
-            glove_answers: snapshot.glove_answers,
-            gripper_answers: snapshot.gripper_answers,
+            glove_answers,
+            gripper_answers,
         }
     }
 
+    /// The same of a bridge in this process.
+    pub(super) fn of(seen: &Snapshot, unattended: bool) -> Self {
+        Self::new(
+            seen.state,
+            seen.glove_answers,
+            seen.gripper_answers,
+            unattended,
+        )
+    }
+
     /// A run that ends with something broken has failed.
-    fn judge(self) -> Result<()> {
+    ///
+    /// # Errors
+    /// What was broken.
+    pub fn judge(self) -> Result<()> {
         if let Some(state) = self.faulted {
             return Err(Failure::new(
                 format!("the run ended {state}"),
@@ -63,7 +76,7 @@ impl Ending {
 }
 
 /// What a run is in which nobody saw that the clutch opened by itself.
-pub fn clutch_expired() -> Failure {
+fn clutch_expired() -> Failure {
     Failure::new(
         "the clutch opened by itself, since no heartbeat came for 1 s; the gripper was held from then on",
         "the same on a computer that neither sleeps nor has so much to do; on a terminal, space closes the clutch again",
@@ -121,22 +134,36 @@ impl Finished {
         let stopped = self.stopped.and_then(|stopped| stopped.judge().map(drop));
         let ending = self.ending.map_or(Ok(()), Ending::judge);
         let log = self.log.as_ref().map_or(Ok(()), Written::judge);
-        let (driven, value) = match driven {
-            Ok(value) => (Ok(()), Some(value)),
-            Err(error) => (Err(error), None),
-        };
-        let mut failures = [stopped, driven, ending, log]
-            .into_iter()
-            .filter_map(Result::err);
-        match (failures.next(), value) {
-            (Some(first), _) => {
-                failures.for_each(|other| note!("also: {other:#}"));
-                Err(first)
-            }
-            (None, Some(value)) => Ok(value),
-            // An error of `driven` is among the failures.
-            (None, None) => Err(anyhow::anyhow!("the run failed")),
+        first_failure(stopped, driven, [ending, log])
+    }
+}
+
+/// Of what went wrong at the end of a run the first in this order: whether the gripper may still move, what ended the run,
+/// the rest. The others are noted.
+///
+/// # Errors
+/// That one.
+pub fn first_failure<T>(
+    stopped: Result<()>,
+    driven: Result<T>,
+    rest: impl IntoIterator<Item = Result<()>>,
+) -> Result<T> {
+    let (driven, value) = match driven {
+        Ok(value) => (Ok(()), Some(value)),
+        Err(error) => (Err(error), None),
+    };
+    let mut failures = [stopped, driven]
+        .into_iter()
+        .chain(rest)
+        .filter_map(Result::err);
+    match (failures.next(), value) {
+        (Some(first), _) => {
+            failures.for_each(|other| note!("also: {other:#}"));
+            Err(first)
         }
+        (None, Some(value)) => Ok(value),
+        // An error of `driven` is among the failures.
+        (None, None) => Err(anyhow::anyhow!("the run failed")),
     }
 }
 

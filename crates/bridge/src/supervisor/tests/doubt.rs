@@ -130,7 +130,7 @@ fn a_finger_that_stands_is_told_while_the_others_move_and_a_software_limit_is_no
         bench.tick();
         // Finger C is jammed, and says that it is at its position.
         bench.status().position[2] = stuck;
-        if (bench.now / (400 * MS)) % 2 == 0 {
+        if (bench.now / (400 * MS)).is_multiple_of(2) {
             bench.output[0] = 60.0;
         } else {
             bench.output[0] = 160.0;
