@@ -28,14 +28,14 @@ const SESSION: u32 = 7;
 /// Time between two requests of the host, µs: what a chunk takes on the line, and its reply.
 const REQUEST_EVERY: u64 = 60_000;
 const BEAT: u64 = 100_000;
-/// Of the first closing of the clutch since the start.
-const FIRST_EPOCH: u32 = 1;
 /// Bytes of a slot, as on the board.
 const SLOT: usize = 128 * 1024;
 /// Glove and gripper are up by then, µs.
 const UP: u64 = 6_000_000;
 /// The glove was calibrated on a flat hand by then, µs.
-const CALIBRATED: u64 = 10_000_000;
+const CALIBRATED: u64 = 14_000_000;
+/// Time between two calibrations, µs: the longest a try takes.
+const CALIBRATE_EVERY: u64 = 2_100_000;
 /// The virtual gripper has activated by then, µs.
 const ACTIVE: u64 = 20_000_000;
 
@@ -74,13 +74,10 @@ pub fn record(
 ) -> Recorded {
     let clock = Clock::new();
     let log = Log::default();
-    // Flat until the glove is calibrated.
+    // Flat until the glove is calibrated, then into the motion within a second.
     let shown = move |time_s: f64| {
-        if time_s < CALIBRATED as f64 * 1e-6 {
-            [0.0; 25]
-        } else {
-            hand(time_s)
-        }
+        let share = (time_s - CALIBRATED as f64 * 1e-6).clamp(0.0, 1.0) as f32;
+        hand(time_s).map(|angle| angle * share)
     };
     let glove = VirtualGlove::new(Box::new(shown), rig::glove::Config::at_baud(BAUD));
     let gripper = VirtualGripper::new(rig::gripper::Config::default());
@@ -268,8 +265,11 @@ struct Host<'i> {
     offset: usize,
     due: u64,
     activated: bool,
-    calibrated: bool,
-    engaged: bool,
+    /// When it calibrates next.
+    calibrate: u64,
+    beats: u32,
+    /// Engages said so far: the epoch, where none was lost.
+    epoch: u32,
     until: u64,
     released: bool,
 }
@@ -282,8 +282,9 @@ impl<'i> Host<'i> {
             offset: 0,
             due: 0,
             activated: false,
-            calibrated: false,
-            engaged: false,
+            calibrate: UP,
+            beats: 0,
+            epoch: 0,
             until: ACTIVE + seconds * 1_000_000,
             released: false,
         }
@@ -318,8 +319,9 @@ impl<'i> Host<'i> {
         } else if !self.activated && now >= UP {
             self.activated = true;
             self.say(line, Call::Activate);
-        } else if !self.calibrated && now >= UP {
-            self.calibrated = true;
+        } else if now >= self.calibrate && now < CALIBRATED - CALIBRATE_EVERY {
+            // More than once: on a line with faults a request may be lost, and a second with a lost sensor is refused.
+            self.calibrate = now + CALIBRATE_EVERY;
             self.say(line, Call::CalibrateFlatHand);
         } else if now < ACTIVE {
             // A line that is not clean: what is no frame is counted and passed over.
@@ -327,12 +329,14 @@ impl<'i> Host<'i> {
             self.say(line, Call::Status);
             self.due = now + 10 * REQUEST_EVERY;
         } else if now < self.until {
-            let call = if self.engaged {
-                Call::Heartbeat { epoch: FIRST_EPOCH }
-            } else {
+            // Now and then a person closes it anew: one Engage may be lost.
+            let call = if self.beats.is_multiple_of(10) {
+                self.epoch += 1;
                 Call::Engage
+            } else {
+                Call::Heartbeat { epoch: self.epoch }
             };
-            self.engaged = true;
+            self.beats += 1;
             self.say(line, call);
             self.due = now + BEAT;
         } else {
