@@ -1,6 +1,6 @@
 //! Printing that never holds up the program, and outlives its reader: `gauntlet … | head` ends quietly, not in a panic.
 //!
-//! Each stream has a queue and a thread that writes it ([`stream`]). A terminal that takes nothing (its reader stands, a
+//! Each stream has a queue and a thread that writes it (`out::stream`). A terminal that takes nothing (its reader stands, a
 //! full pipe) stops that thread alone: whoever drives a gripper goes on, and sees through [`unseen`] that nobody sees.
 
 mod stream;

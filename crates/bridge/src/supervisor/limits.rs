@@ -82,7 +82,7 @@ fn well_inside<const X: usize>(position: &[u8; X]) -> bool {
 }
 
 /// `command`, changed where needed so that the gripper stays inside the configuration space on its way, in whatever order
-/// its axes arrive. `ceiling` is, axis by axis, the farthest closed it can be by now ([`super::underway`]); `measured`, at
+/// its axes arrive. `ceiling` is, axis by axis, the farthest closed it can be by now (`supervisor::underway`); `measured`, at
 /// most that, is where it was last seen. Axes only ever move towards `measured`, so a lead that was kept stays kept.
 ///
 /// A gripper that may be outside, or within the margin of the edge, may only open, axis by axis, until it is not.

@@ -25,7 +25,7 @@ pub enum Restart {
     Unknown,
     /// Its power came, or its reset pin was pulled.
     Power,
-    /// It was asked to ([`Call::Reboot`]), or a fault handler did.
+    /// It was asked to (the call `Reboot`), or a fault handler did.
     Software,
     /// The watchdog: the loop hung.
     Watchdog,
