@@ -198,7 +198,7 @@ pub enum Hand {
 #[command(after_help = "\
 Examples:
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --engage --activate --seconds 10
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
 
 Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
 `--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \

@@ -108,7 +108,7 @@ fn engaging_a_gripper_that_is_not_activated_is_refused_with_the_way_out() {
     let output = run_owned(&teleop(
         &simulation.glove(),
         &simulation.gripper(),
-        &["--engage", "--seconds", "2"],
+        &["--calibrate-flat", "--engage", "--seconds", "2"],
     ));
     assert!(refusal(&output, 1).contains("not activated"));
     assert!(text(&output.stderr).contains("--activate"));
@@ -173,7 +173,11 @@ fn a_hold_that_the_gripper_does_not_confirm_is_told_as_a_failure() {
     let mut simulation = Simulation::start(true, true);
     let log = simulation.folder.path().join("run.mcap");
     let (child, said) = driving(&simulation, "following", log.to_str().unwrap());
-    // Both devices are gone at once, as when a power strip is switched off.
+    // Both devices are gone at once, as when a power strip is switched off. The links go first: their terminals' numbers are
+    // given out again, and the tool would open another test's.
+    for device in ["glove", "gripper"] {
+        std::fs::remove_file(simulation.folder.path().join(device)).unwrap();
+    }
     simulation.child.kill().unwrap();
     std::thread::sleep(Duration::from_millis(300));
     interrupt(&child);

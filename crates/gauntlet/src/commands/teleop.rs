@@ -30,6 +30,13 @@ pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
 pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_ports(options)?;
+    if options.engage && !options.calibrate_flat {
+        return Err(Failure::usage(
+            "--engage closes the clutch from the start, and a glove that is not calibrated does not drive",
+            "--calibrate-flat as well: it waits until the hand lies flat and still",
+        )
+        .into());
+    }
     check_model(options)?;
     let line = options.line.settings(&options.gripper)?;
     if let Some(path) = &options.log {
