@@ -127,9 +127,16 @@ impl<const X: usize> Supervisor<X> {
             return None;
         }
         let lead = self.config.settings().lead;
-        let held = self.held.unwrap_or_else(|| status.hold());
+        // An echo that is not ours is no grip of ours, and nothing to repeat.
+        let echo_lies = self.echo_lies;
+        let here = if echo_lies {
+            status.position
+        } else {
+            status.hold()
+        };
+        let held = self.held.unwrap_or(here);
         let held = core::array::from_fn(|axis| {
-            if limits::touches(status.contact[axis]) {
+            if limits::touches(status.contact[axis]) && !echo_lies {
                 return status.echo[axis];
             }
             let here = status.position[axis];

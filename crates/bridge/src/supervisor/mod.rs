@@ -13,7 +13,7 @@ mod underway;
 pub use hand::Hand;
 pub use state::{Conditions, GripperFault, HoldReason, State};
 
-use crate::clutch::Clutch;
+use crate::clutch::{Clutch, Position};
 use crate::config::Config;
 use crate::{Duration, Instant, timing};
 use believed::Believed;
@@ -85,6 +85,10 @@ pub struct Supervisor<const X: usize> {
     underway: Underway<X>,
     believed: Believed<X>,
     was_ready: bool,
+    /// Its positions cannot be true, and nobody has closed the clutch since.
+    lies: bool,
+    /// Its echo was not what it was told, and no motion has begun since.
+    echo_lies: bool,
     /// What the gripper echoes is not what it is told.
     ignored: bool,
     ignored_since: Option<Instant>,
@@ -135,6 +139,8 @@ impl<const X: usize> Supervisor<X> {
             underway: Underway::new(),
             believed: Believed::new(),
             was_ready: false,
+            lies: false,
+            echo_lies: false,
             ignored: false,
             ignored_since: None,
         }
@@ -167,11 +173,21 @@ impl<const X: usize> Supervisor<X> {
         if let Some(hand) = &inputs.hand {
             self.follower.accept(now, hand);
         }
+        if self.lies && self.state == State::Idle && inputs.clutch.position(now) == Position::Closed
+        {
+            // A person looked, and closes the clutch again: what was doubted is looked at anew.
+            self.lies = false;
+            self.believed.forget();
+        }
         let fresh = |status: &Status<X>| timing::is_fresh(now, status.stamp);
         let said = inputs.status.filter(fresh);
         let judged = said.map(|status| self.believed.take(now, &status));
-        let status = judged.and_then(|judged| judged.status).filter(fresh);
         let implausible = judged.and_then(|judged| judged.implausible);
+        self.lies |= implausible.is_some();
+        // Of a gripper that lies nothing is a place to hold: what it was told last stays, and nothing is written.
+        let status = judged
+            .and_then(|judged| judged.status)
+            .filter(|status| fresh(status) && !self.lies);
         let gripper = Said {
             status: said,
             implausible,
@@ -181,9 +197,7 @@ impl<const X: usize> Supervisor<X> {
         let before = self.state;
         self.state = state::next(before, &conditions);
         self.enter(now, before, status.as_ref());
-        if self.state == State::Idle && implausible.is_some() {
-            self.believed.forget();
-        }
+        self.echo_lies |= self.state == State::Faulted(GripperFault::CommandIgnored);
         let (motion, stamp) = self.motion(
             now,
             gap.unwrap_or(Duration::from_ticks(0)),
@@ -329,6 +343,7 @@ impl<const X: usize> Supervisor<X> {
             since: now,
         };
         self.moved = true;
+        self.echo_lies = false;
         self.held_since = None;
         self.ignored_since = None;
     }

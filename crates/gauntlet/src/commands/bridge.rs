@@ -187,6 +187,8 @@ fn engage(
 ) -> Result<()> {
     let tell = Tell::new(at.json);
     let mut link = connect(at)?;
+    // An older bridge is refused before anything moves.
+    link.health().map_err(Failure::from)?;
     if calibrate && !calibrated(&mut link, &tell, interrupt)? {
         return Ok(());
     }

@@ -33,6 +33,9 @@ const UNSEEN: Duration = Duration::from_millis(250);
 /// Keys that came while nobody looked for longer than this are old.
 const LOOKED: Duration = Duration::from_millis(300);
 
+/// A space bar that comes again within this is held down: terminals wait half a second before they repeat.
+const REPEATS: Duration = Duration::from_millis(700);
+
 /// What a person asked for with a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Key {
@@ -101,6 +104,8 @@ pub struct Live {
     shown: Option<Instant>,
     /// When keys were looked for last, since the computer's start.
     looked: Option<Duration>,
+    /// When the space bar was pressed last.
+    space: Option<Duration>,
     /// Whether somebody sits at a terminal, who may close it.
     terminal: bool,
 }
@@ -135,6 +140,7 @@ impl Live {
             target,
             shown: None,
             looked: None,
+            space: None,
             terminal,
         })
     }
@@ -193,7 +199,14 @@ impl Live {
             _ if self.terminal && hung_up(&std::io::stdin()) => vec![Key::End],
             _ => Vec::new(),
         };
-        Ok(if old { safe(keys) } else { keys })
+        // A key that is held down repeats: only its first press may close the clutch.
+        let repeated = self
+            .space
+            .is_some_and(|before| now.saturating_sub(before) < REPEATS);
+        if keys.contains(&Key::Clutch) {
+            self.space = Some(now);
+        }
+        Ok(if old || repeated { safe(keys) } else { keys })
     }
 
     /// Gives the terminal back while `stop` stops this program, and takes it again when it goes on.

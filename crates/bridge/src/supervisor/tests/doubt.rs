@@ -165,3 +165,56 @@ fn nothing_is_commanded_from_a_first_status_that_no_second_one_confirms() {
         (None, State::Holding(HoldReason::GripperSilent))
     );
 }
+
+#[test]
+fn opening_the_clutch_after_positions_that_cannot_be_true_sends_the_gripper_nowhere() {
+    let mut bench = following();
+    bench.ticks(300);
+    let told = bench.status().echo;
+    // They jump, and stay so.
+    let off = |_: usize, truth: [u8; 4]| truth.map(|x| if x > 127 { x - 100 } else { x + 100 });
+    let outputs = lie(&mut bench, off, 50);
+    assert!(matches!(
+        outputs[49].state,
+        State::Faulted(GripperFault::Implausible { .. })
+    ));
+    bench.beating = false;
+    for _ in 0..300 {
+        bench.now += 10 * MS;
+        let now = bench.now;
+        bench.answer(now);
+        bench.inputs.clutch = Clutch::Open;
+        let truth = bench.status().position;
+        bench.status().position = off(0, truth);
+        let output = bench.supervisor.step(at(now), &bench.inputs);
+        bench.status().position = truth;
+        assert_eq!(output.state, State::Idle);
+        let farthest = farthest(&[output], told);
+        assert!(farthest <= 2, "told to go {farthest} counts");
+    }
+}
+
+#[test]
+fn an_echo_that_is_not_ours_is_not_what_a_hold_repeats() {
+    let mut bench = following();
+    bench.ticks(300);
+    bench.output = [30.0, 40.0, 50.0, 200.0];
+    for step in 0..600 {
+        bench.now += 10 * MS;
+        let now = bench.now;
+        let status = bench.status();
+        status.stamp = at(now);
+        (status.echo, status.contact) = ([255; 4], [Contact::ContactClosing; 4]);
+        let here = status.position;
+        bench.frame(Ok(bench.output), now - 5 * MS);
+        // A person opens it in the end.
+        bench.inputs.clutch = if step < 300 {
+            closed(at(now))
+        } else {
+            Clutch::Open
+        };
+        let output = bench.supervisor.step(at(now), &bench.inputs);
+        assert!(farthest(&[output], here) <= 40, "{output:?}");
+    }
+    assert_eq!(bench.supervisor.state(), State::Idle);
+}
