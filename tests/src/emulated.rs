@@ -244,17 +244,19 @@ impl Loop {
         let clock = |link: &mut HostLink| link.status().expect("an answer").now_us as f64 * 1e-6;
         let (started, bridge_started) = (Instant::now(), clock(&mut self.link));
         let before = self.link.counters().expect("an answer");
-        let half = hold_clutch(&mut self.link, time / 2);
-        let moved = self.gripper.positions() != positions;
-        let states = hold_clutch(&mut self.link, time - time / 2);
+        // Looked at more than once: twice it may stand at the same end of its way.
+        let (mut states, mut moved) = (Vec::new(), false);
+        for _ in 0..4 {
+            states.extend(hold_clutch(&mut self.link, time / 4));
+            moved |= self.gripper.positions() != positions;
+        }
         let after = self.link.counters().expect("an answer");
         let following = |state: &State| *state == State::Following;
         Stretch {
             seconds: started.elapsed().as_secs_f64(),
             bridge_seconds: clock(&mut self.link) - bridge_started,
             grown: after.since(&before),
-            followed_throughout: half.iter().chain(&states).all(following)
-                && before.holds == after.holds,
+            followed_throughout: states.iter().all(following) && before.holds == after.holds,
             moved,
         }
     }
