@@ -4,6 +4,7 @@
 //! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
 //! differs from the fast one on a plane (`m1`, `m2`, `stage_rate`, `rate`, `decay`, `start`, `ramp`, `cool`, `batches`; see
 //! `trainer::algorithm::Plan`); seeds: `5`, or `6-10`; then threads, and the deviation of initial weights that are normally distributed.
+//! `-- estimate hand fast 3` says how right the estimate of the time left is along the way (words as of `quality`).
 //! `-- speed 2` prints the table of times a step on two threads, with the phases of a step and
 //! how it grows. Without a word it prints all there is about speed, and draws the growth into `target/bench-train`.
 
@@ -184,6 +185,43 @@ fn train(
         truth: domain.truth.as_ref(),
     };
     Ok((measure(&trained.networks.f, &test), seconds))
+}
+
+/// How far the estimate of the time left is off along the way, as a share of the time that was left.
+fn estimate(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result<()> {
+    let mut domain = domain(name, seed)?;
+    domain.settings.schedule = schedule;
+    domain.settings.threads = threads;
+    let mut trainer = Trainer::new(&domain.train, &domain.targets, &domain.settings)?;
+    let mut operator = InUnits {
+        operator: domain.operator.as_mut(),
+        input: &domain.units.0,
+        target: &domain.units.1,
+    };
+    let start = Instant::now();
+    let mut told = Vec::new();
+    trainer.run(&mut operator, &mut |progress| {
+        told.push((
+            start.elapsed().as_secs_f64(),
+            progress.remaining.as_secs_f64(),
+        ));
+        ControlFlow::Continue(())
+    })?;
+    let took = start.elapsed().as_secs_f64();
+    if std::env::var_os("PROF").is_some() { for w in told.chunks(told.len()/25) { let (a,b)=(w[0],w[w.len()-1]); eprintln!("{:.2} ms/report at {:.2} s, left {:.2}, true {:.2}", 1e3*(b.0-a.0)/(w.len()-1) as f64, a.0, a.1, took-a.0);} }
+    print!("{name} seed {seed}, {took:.1} s: estimate − time left, by time left:");
+    for share in [0.1, 0.2, 1.0 / 3.0, 0.5, 0.7, 0.9] {
+        if let Some(&(at, left)) = told.iter().find(|&&(at, _)| at >= share * took) {
+            let true_left = took - at;
+            print!(
+                "  {:+.0} % at {:.0} %",
+                100.0 * (left / true_left - 1.0),
+                100.0 * share
+            );
+        }
+    }
+    println!();
+    Ok(())
 }
 
 fn median(mut values: Vec<f64>) -> [f64; 3] {
@@ -462,6 +500,17 @@ fn main() -> Result<()> {
             word(4, "2").parse()?,
             words.get(5).map(|word| word.parse()).transpose()?,
         ),
+        "estimate" => {
+            for seed in seeds(word(3, "3"))? {
+                estimate(
+                    word(1, "hand"),
+                    schedule(word(2, "fast"))?,
+                    seed,
+                    word(4, "2").parse()?,
+                )?;
+            }
+            Ok(())
+        }
         "speed" => {
             speed(word(1, "1").parse()?);
             Ok(())

@@ -5,12 +5,13 @@ use super::{Trainer, Weights};
 use core::time::Duration;
 use std::time::Instant;
 
-/// A newest step counts for no less than this share, so that the estimate follows a machine that is busy now.
-const LEAST_SHARE: f64 = 1.0 / 200.0;
+/// A newest step counts for no less than this share, so that the estimate follows a machine that is busy now, and steps that cost
+/// less as the map settles.
+const LEAST_SHARE: f64 = 1.0 / 50.0;
 /// A trial is made so often in a training, for as long as there is no attraction.
 const TRIALS: usize = 16;
 /// Steps of a trial that count, after one with each batch: the first visit of a batch looks for every neighbour anew.
-const COUNTED: usize = 4;
+const COUNTED: usize = 7;
 
 /// Estimates the time left, from the time of the steps so far, with and without attraction.
 pub(super) struct Clock {
@@ -66,8 +67,10 @@ impl Clock {
         let seconds = evaluation(trainer, &last, trainer.epoch % batches);
         self.trial.push(seconds);
         if self.trial.len() == batches + COUNTED {
-            let counted = &self.trial[batches..];
-            self.seconds[1] = counted.iter().sum::<f64>() / counted.len() as f64;
+            // The middle one: another program may have had the processor meanwhile.
+            let counted = &mut self.trial[batches..];
+            counted.sort_by(f64::total_cmp);
+            self.seconds[1] = counted[COUNTED / 2];
             self.trial.clear();
             self.next_trial = trainer.epoch + trainer.total() / TRIALS;
         }
