@@ -208,7 +208,6 @@ fn estimate(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result
         ControlFlow::Continue(())
     })?;
     let took = start.elapsed().as_secs_f64();
-    if std::env::var_os("PROF").is_some() { for w in told.chunks(told.len()/25) { let (a,b)=(w[0],w[w.len()-1]); eprintln!("{:.2} ms/report at {:.2} s, left {:.2}, true {:.2}", 1e3*(b.0-a.0)/(w.len()-1) as f64, a.0, a.1, took-a.0);} }
     print!("{name} seed {seed}, {took:.1} s: estimate − time left, by time left:");
     for share in [0.1, 0.2, 1.0 / 3.0, 0.5, 0.7, 0.9] {
         if let Some(&(at, left)) = told.iter().find(|&&(at, _)| at >= share * took) {
