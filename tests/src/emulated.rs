@@ -131,15 +131,14 @@ pub fn hold_clutch(link: &mut HostLink, time: Duration) -> Vec<State> {
     states
 }
 
-/// Calibrates the bridge on the hand as it lies now.
+/// Calibrates the bridge on the hand as it lies now, as often as it takes: sensors may just be coming up.
 fn calibrate(link: &mut HostLink) {
     link.calibrate_flat_hand().expect("taken");
     wait_for(link, "the calibration", |link| {
         let calibration = link.health().expect("an answer").calibration;
-        assert!(
-            !matches!(calibration.newest, Try::Refused(_)),
-            "{calibration:?}"
-        );
+        if matches!(calibration.newest, Try::Refused(_)) {
+            link.calibrate_flat_hand().expect("taken");
+        }
         calibration.is_calibrated
     });
 }
@@ -152,6 +151,8 @@ pub struct Loop {
     pub gripper: VirtualGripper,
     emulator: Emulator,
     ports: [Handle; 2],
+    /// Whether the hand moves, or lies flat.
+    moves: Arc<AtomicBool>,
 }
 
 /// What a stretch of time did to the counters.
@@ -218,7 +219,36 @@ impl Loop {
             gripper,
             emulator,
             ports,
+            moves,
         }
+    }
+
+    /// What a person does when the session is over: a new one and, where the chip has started anew, too, a hand that lies flat.
+    /// Whether it has.
+    ///
+    /// # Panics
+    /// The bridge does not come back.
+    pub fn bring_back(&mut self) -> bool {
+        self.link.reconnect().expect("a session");
+        wait_for(&mut self.link, "the glove", |link| {
+            link.status().expect("an answer").glove_answers
+        });
+        wait_for(&mut self.link, "the gripper", |link| {
+            link.status().expect("an answer").gripper.is_some()
+        });
+        let health = self.link.health().expect("an answer");
+        if health.calibration.is_calibrated {
+            return false;
+        }
+        self.moves.store(false, Ordering::Relaxed);
+        calibrate(&mut self.link);
+        self.moves.store(true, Ordering::Relaxed);
+        true
+    }
+
+    /// Whether the bridge still knows the session.
+    pub fn knows_session(&mut self) -> bool {
+        self.link.status().is_ok()
     }
 
     /// The emulator's process.

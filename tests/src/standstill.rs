@@ -12,6 +12,10 @@ use crate::random;
 /// How far the first command may lie from the gripper, counts: what it moves between a status and the next command, and
 /// the time this process takes to look.
 pub const BETWEEN: f32 = 8.0;
+/// How fast somebody else moves the fingers, counts a second: slower than the gripper could, or the positions would be doubted.
+const PUSHED: f32 = 150.0;
+/// How far at most.
+const FARTHEST: f32 = 90.0;
 /// What a stopped process wrote last has arrived by then.
 const ARRIVED: Duration = Duration::from_millis(30);
 /// By then a process that goes on has written, if it does.
@@ -35,16 +39,15 @@ pub fn stop(process: u32, time: Duration, gripper: &VirtualGripper, clock: &Cloc
     let writes = gripper.writes();
     std::thread::sleep(time / 2);
     gripper.run_until(clock.now());
+    let moved = (PUSHED * time.as_secs_f32()).min(FARTHEST);
     for axis in 0..3 {
         let here = gripper.positions()[axis];
-        gripper.set_position(
-            axis,
-            if here > 128.0 {
-                here - 90.0
-            } else {
-                here + 90.0
-            },
-        );
+        let there = if here > 128.0 {
+            here - moved
+        } else {
+            here + moved
+        };
+        gripper.set_position(axis, there);
     }
     std::thread::sleep(time.saturating_sub(time / 2 + ARRIVED));
     kill_process(process, Signal::CONT).expect("a process");
