@@ -205,7 +205,7 @@ mod tests {
                     {
                         let mut here = 0;
                         let random = |k: u64| {
-                            if k % held == 0 {
+                            if k.is_multiple_of(held) {
                                 seed ^= seed << 13;
                                 seed ^= seed >> 17;
                                 seed ^= seed << 5;

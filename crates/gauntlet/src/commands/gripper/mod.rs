@@ -3,9 +3,12 @@
 mod args;
 mod axes;
 mod bench;
+mod hold;
 mod leader;
 mod motion;
 mod progress;
+mod proof;
+mod refusal;
 mod table;
 mod task;
 
@@ -142,7 +145,11 @@ fn act<B: Bench<X>, const X: usize>(
     match &options.verb {
         Verb::Status(_) => {}
         Verb::Activate(_) => doing.activate(&status)?,
-        Verb::Move(options) => motion::run(&mut doing, options, &status)?,
+        Verb::Move(options) => {
+            // What is shown is what the end was judged by: another look could bring a position that is not believed.
+            let status = motion::run(&mut doing, options, &status)?;
+            return doing.show_status(&status);
+        }
         Verb::Mode(options) => doing.mode(options.mode)?,
         Verb::Release(options) => doing.release(options.closing)?,
         Verb::Reset(_) => {
@@ -322,11 +329,19 @@ impl<B> Doing<'_, B> {
                 }
                 Failure::new("the gripper stopped answering", self.target.doctor())
             })?;
+        self.show_status(&status)
+    }
+
+    /// Shows `status`.
+    fn show_status<const X: usize>(&self, status: &Status<X>) -> Result<()>
+    where
+        B: Bench<X>,
+    {
         let (place, raw) = (self.place(), self.target.raw);
         if self.target.json {
-            return out::json(&table::json(&self.driver, &status, &place, raw));
+            return out::json(&table::json(&self.driver, status, &place, raw));
         }
-        for line in table::lines(&self.driver, &status, &place, raw) {
+        for line in table::lines(&self.driver, status, &place, raw) {
             say!("{line}");
         }
         Ok(())
