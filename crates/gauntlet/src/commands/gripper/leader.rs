@@ -28,6 +28,8 @@ pub(super) const STALL: gripper::Duration = timing::STALE_MOTION;
 /// Nobody looked for this long: whoever began the move may be elsewhere by now, and it ends. As long as a clutch stays
 /// closed without a sign of its person.
 const STOOD: gripper::Duration = gripper::Duration::from_secs(1);
+/// Statuses that must agree after a doubted one before the next is led from.
+const SUSPECT: u8 = 2;
 /// Positions that have not become believable for this long will not.
 const DOUBT: gripper::Duration = gripper::Duration::from_secs(3);
 
@@ -71,6 +73,8 @@ pub(super) struct Leader<'a, const X: usize> {
     pub(super) looked: Instant,
     /// Positions in the status before this one, whatever they are worth.
     pub(super) before: [u8; X],
+    /// How many more statuses must agree before one is led from.
+    suspect: u8,
     /// Since when they have not been believed.
     doubted: Option<Instant>,
     /// Writes before the move, and since when one could have left.
@@ -106,6 +110,7 @@ impl<'a, const X: usize> Leader<'a, X> {
             heard: now,
             looked: now,
             before: status.position,
+            suspect: 0,
             doubted: None,
             written: doing.driver.counters().writes,
             ready_since: None,
@@ -165,12 +170,20 @@ impl<'a, const X: usize> Leader<'a, X> {
         let assured = self.assurance.take(status, verdict);
         let end = match verdict {
             Verdict::Implausible { axis } => Some(End::Doubted(self.implausible(status, axis))),
+            // After a doubted one a single status may agree by chance.
+            Verdict::Used { .. } if assured && self.suspect > 0 => {
+                self.suspect -= 1;
+                None
+            }
             Verdict::Used { within } if assured => {
                 self.doubted = None;
                 self.lead(driver, now, status, within)
             }
             // What it was told stays: a step that cannot be is no reason for another one.
-            Verdict::Doubted { .. } if assured => None,
+            Verdict::Doubted { .. } if assured => {
+                self.suspect = SUSPECT;
+                None
+            }
             _ => self.wait_for_agreement(now, status),
         };
         self.before = status.position;
@@ -190,6 +203,7 @@ impl<'a, const X: usize> Leader<'a, X> {
     /// What was seen is of another time: it is looked at anew.
     pub(super) fn forget(&mut self) {
         (self.command, self.ready_since, self.doubted) = (None, None, None);
+        self.suspect = 0;
         self.judge.forget();
         self.assurance = Assurance::default();
         self.progress.restart();
@@ -325,3 +339,7 @@ pub(super) fn since(now: Instant, then: Instant) -> gripper::Duration {
     now.checked_duration_since(then)
         .unwrap_or(gripper::Duration::from_ticks(0))
 }
+
+#[cfg(test)]
+#[path = "leader_tests.rs"]
+mod tests;
