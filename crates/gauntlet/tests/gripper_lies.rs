@@ -252,3 +252,58 @@ fn what_a_move_shows_at_its_end_is_what_it_ended_with() {
     let position = said["axes"][0]["position"].as_u64().unwrap();
     assert!((78..=82).contains(&position), "{said}");
 }
+
+#[test]
+fn an_activation_is_not_called_done_on_a_status_that_contradicts_itself() {
+    for family in [Family::ThreeFinger, Family::TwoFinger85] {
+        let (gripper, _handle, path) = gripper(Config::of(family));
+        gripper.preset_active();
+        // Ready, and to be activated first.
+        gripper.set_fault(Some(5));
+        let verb = [
+            "gripper",
+            "activate",
+            "--gripper",
+            &path,
+            "--model",
+            model(family),
+        ];
+        let output = run(&verb);
+        let error = refusal(&output, 1);
+        assert!(
+            error.contains("does not bear that out: ready, fault 05"),
+            "{error}"
+        );
+        assert!(
+            text(&output.stderr).contains(&format!("`gauntlet gripper reset --gripper {path}"))
+        );
+        assert_eq!(gripper.writes(), 0);
+    }
+}
+
+#[test]
+fn a_status_whose_positions_jump_is_shown_and_not_called_good() {
+    for family in [Family::ThreeFinger, Family::TwoFinger85] {
+        let (gripper, _handle, path) = gripper(Config::of(family));
+        gripper.preset_active();
+        let verb = [
+            "gripper",
+            "status",
+            "--gripper",
+            &path,
+            "--model",
+            model(family),
+            "--json",
+        ];
+        assert_eq!(run(&verb).status.code(), Some(0));
+        gripper.scatter_shown_positions(Some(7));
+        let output = run(&verb);
+        let error = refusal(&output, 1);
+        assert!(error.contains("they jump from status to status"), "{error}");
+        assert!(
+            text(&output.stdout).contains("\"activation\": \"ready\""),
+            "shown before"
+        );
+        assert_eq!(gripper.writes(), 0);
+    }
+}
