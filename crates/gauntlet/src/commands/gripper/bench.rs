@@ -197,8 +197,8 @@ impl Waiter {
         }
     }
 
-    /// Polls the driver until `step` breaks; `None` when the time is over or the end was asked for. Time in which the
-    /// process stood still does not count: nobody looked.
+    /// Polls the driver until `step` breaks; `None` when the time is over or the end was asked for. A time in which the
+    /// process stood still counts as [`STALL`], however long it was: nobody looked.
     pub fn pump<B: Bench<X>, T, const X: usize>(
         &self,
         driver: &mut B,
@@ -215,9 +215,7 @@ impl Waiter {
             let now = self.clock.now();
             let passed = now.as_ticks().saturating_sub(looked.as_ticks());
             looked = now;
-            if passed < STALL.as_ticks() {
-                left = left.saturating_sub(passed);
-            }
+            left = left.saturating_sub(passed.min(STALL.as_ticks()));
             let heard = driver.poll(now);
             if let ControlFlow::Break(value) = step(driver, now, heard) {
                 return Some(value);
