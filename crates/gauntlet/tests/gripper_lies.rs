@@ -144,7 +144,7 @@ fn a_finger_that_jams_and_says_that_it_is_there_is_told_as_standing() {
     gripper.set_shown_contact(Some(3));
     let (_, output) = farthest(&gripper, &handle, child);
     let error = refusal(&output, 1);
-    assert!(error.contains("finger A is said to stand at"), "{error}");
+    assert!(error.contains("finger A stood short of 250"), "{error}");
 }
 
 #[test]

@@ -232,21 +232,24 @@ fn a_limit_in_mid_stroke_is_proved_by_a_step_back() {
     let (end, gripper) = moved(200, |_, truth| truth.min(120), &[]);
     assert!(matches!(end, Some(End::Stands([Some(Rest::Limit)]))));
     assert_eq!(gripper.told, 160);
-    // It stays at 120 once it was there.
+    // It stays at 120 once it was there; it says half of what is so.
     let mut frozen = false;
-    let shown = |_: u64, truth: u8| {
+    let freezes = |_: u64, truth: u8| {
         frozen |= truth >= 120;
         if frozen { 120 } else { truth }
     };
-    let (end, gripper) = moved(200, shown, &[]);
-    let Some(End::Doubted(failure)) = end else {
-        panic!("not told");
-    };
-    assert!(
-        failure.to_string().contains("no software limit"),
-        "{failure}"
-    );
-    assert!(gripper.farthest <= 40.0, "{}", gripper.farthest);
+    let frozen = moved(200, freezes, &[]);
+    let (halved, _) = moved(200, |_, truth| truth / 2 + 15, &[]);
+    for end in [frozen.0, halved] {
+        let Some(End::Doubted(failure)) = end else {
+            panic!("not told");
+        };
+        assert!(
+            failure.to_string().contains("no software limit"),
+            "{failure}"
+        );
+    }
+    assert!(frozen.1.farthest <= 40.0, "{}", frozen.1.farthest);
 }
 
 #[test]

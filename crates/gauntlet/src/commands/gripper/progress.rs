@@ -10,13 +10,13 @@ use super::leader::since;
 /// An axis within so many counts of its target is there: positions are rounded, and motors stop a count early or late.
 pub(super) const NEAR: u8 = 2;
 /// An axis that moved by so many counts towards its target was seen to move.
-pub(super) const SEEN: u8 = 3;
+const SEEN: u8 = 3;
 /// A position that changes by no more than this stands.
 const FLICKER: u8 = 1;
 /// Software limits lie at most so far from either mechanical stop: there an axis may stand from the start.
 const STOPS: (u8, u8) = (20, 225);
 /// Standing for this long ends a motion where the gripper says so too, at the target or at an object it was seen to move to.
-const STANDS: Duration = Duration::from_millis(100);
+pub(super) const STANDS: Duration = Duration::from_millis(100);
 /// Standing at the target for this long ends it whatever the gripper says.
 const STANDS_THERE: Duration = Duration::from_millis(300);
 /// Standing short of the target, seen to move there: a software limit. Longer, because a motor may pause.

@@ -1,10 +1,11 @@
 //! Software limits in mid stroke: a finger that stands there short of its target, and says that it is at its position, is
-//! at a limit, or its position has frozen while it went on. So it is told to go a step back and has to be seen to do so.
+//! at a limit, or its position has frozen, or is of another scale, while it went on. So it is told to go a step back and has
+//! to be seen to go there.
 
 use gripper::{Duration, Instant, Status};
 
 use super::leader::since;
-use super::progress::{NEAR, Rest, SEEN, STUCK, is_at_stop};
+use super::progress::{NEAR, Rest, STANDS, STUCK, is_at_stop};
 
 /// The step back, counts. With the lead of a finger on its way it stays within [`super::leader::LEAD`] of where a finger
 /// whose position has frozen can be.
@@ -15,7 +16,7 @@ const BACK: u8 = 6;
 pub(super) enum Step {
     /// It goes on.
     Goes,
-    /// Every axis was seen to follow.
+    /// Every axis was seen to go there.
     Done,
     /// This axis was not, though told to for [`STUCK`].
     Frozen(usize),
@@ -26,7 +27,8 @@ pub(super) enum Step {
 struct Back {
     from: u8,
     to: u8,
-    followed: bool,
+    /// Since when it has stood where it was told to go.
+    there: Option<Instant>,
 }
 
 /// Which axes were seen to stand at a limit.
@@ -71,7 +73,7 @@ impl<const X: usize> Proof<X> {
                 } else {
                     from.saturating_add(BACK)
                 },
-                followed: false,
+                there: None,
             })
         });
         self.back.iter().any(Option::is_some)
@@ -81,15 +83,14 @@ impl<const X: usize> Proof<X> {
     pub(super) fn follow(&mut self, now: Instant, status: &Status<X>) -> Option<Step> {
         for (axis, back) in self.back.iter_mut().enumerate() {
             let Some(back) = back else { continue };
-            let here = status.position[axis];
-            let way = if back.to < back.from {
-                back.from.saturating_sub(here)
-            } else {
-                here.saturating_sub(back.from)
-            };
-            back.followed |= way >= SEEN;
+            // On its way it passes by there, too.
+            let near = status.position[axis].abs_diff(back.to) <= NEAR;
+            back.there = near.then(|| back.there.unwrap_or(now));
         }
-        let waits = |back: &Option<Back>| back.is_some_and(|back| !back.followed);
+        let waits = |back: &Option<Back>| {
+            let there = |at| since(now, at) >= STANDS;
+            back.is_some_and(|back| !back.there.is_some_and(there))
+        };
         if self.back.iter().all(Option::is_none) {
             return None;
         }

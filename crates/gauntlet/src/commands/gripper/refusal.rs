@@ -38,8 +38,8 @@ impl<const X: usize> Leader<'_, X> {
     pub(super) fn frozen(&self, status: &Status<X>, axis: usize) -> Failure {
         let (name, here, there) = (self.names[axis], status.position[axis], self.target[axis]);
         self.doubt(format!(
-            "{name} is said to stand at {here} on its way to {there}, and to stay there when told to go a step back: that is \
-             no software limit, and its position cannot be believed"
+            "{name} stood short of {there}, was told to go a step back, and is said to be at {here}: that is no software limit, \
+             and its position cannot be believed"
         ))
     }
 
