@@ -17,6 +17,7 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+pub mod assurance;
 pub mod driver;
 pub mod link;
 pub mod registers;

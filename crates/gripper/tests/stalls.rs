@@ -6,7 +6,7 @@ mod bench;
 mod support;
 
 use bench::*;
-use gripper::driver::{Config, Family, ThreeFinger};
+use gripper::driver::{Config, Family, Outcome, Task, ThreeFinger};
 use gripper::link::{self, Debt, Link};
 use gripper::registers::STATUS;
 use gripper::registers::two_finger::Model;
@@ -128,6 +128,23 @@ fn after_a_stall_nothing_is_commanded_on_bytes_that_lay_there() {
         assert_eq!(stalls(bench, 1_000, seed), 0, "{name}");
     }
     assert_eq!(stalls(two(Model::TwoFinger85), 300, seed), 0);
+}
+
+#[test]
+fn an_activation_over_which_the_process_stood_still_is_told_as_done() {
+    let mut bench = three();
+    bench.driver.activate();
+    bench.until(5_000, |bench, _| bench.truth.is_moving());
+    bench.clock.advance(Duration::from_secs(60));
+    bench.truth.run_until(bench.clock.now());
+    let end = bench.clock.now() + Duration::from_secs(2);
+    while bench.driver.outcome().is_none() && bench.clock.now() < end {
+        let _ = bench.next(Duration::from_millis(100));
+    }
+    assert_eq!(
+        bench.driver.outcome(),
+        Some((Task::Activate, Outcome::Done))
+    );
 }
 
 const READ: Request<'static> = Request::ReadHolding {

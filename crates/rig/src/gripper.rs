@@ -239,6 +239,29 @@ impl VirtualGripper {
         server.show_status();
     }
 
+    /// Lets the position of axis `index` read this wherever it is, or what it is again.
+    pub fn set_shown_position(&self, index: usize, counts: Option<u8>) {
+        let mut server = self.server();
+        if let Some(shown) = server.lies.shown.get_mut(index) {
+            *shown = counts;
+        }
+        server.show_status();
+    }
+
+    /// Lets every position read anything at all, another number at each refresh, by `seed`; or be true again.
+    pub fn scatter_shown_positions(&self, seed: Option<u64>) {
+        let mut server = self.server();
+        server.lies.scattered = seed;
+        server.show_status();
+    }
+
+    /// Lets the contact of every axis (0 to 3, as gDTx and gOBJ have it) read this; or be true again.
+    pub fn set_shown_contact(&self, contact: Option<u8>) {
+        let mut server = self.server();
+        server.lies.contact = contact.map(|bits| bits & 3);
+        server.show_status();
+    }
+
     /// Stops the motor of axis `index` for good, or lets it turn again; its contact stays as it was.
     pub fn set_dead(&self, index: usize, dead: bool) {
         self.with_axis(index, |a| a.dead = dead);

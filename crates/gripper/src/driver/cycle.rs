@@ -9,6 +9,9 @@ use crate::rtu::{Registers, Request, Response, function};
 use crate::{Duration, Instant, Motion, Status, timing};
 use embedded_io::{Read, ReadReady, Write};
 
+/// Nobody polled for this long: a task's time goes on from here.
+const STOOD: Duration = Duration::from_secs(1);
+
 /// The request under way.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Doing<const X: usize> {
@@ -284,9 +287,13 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         let Some(due) = self.due else {
             return;
         };
-        if timing::since(now, due) > self.link.config().longest_exchange() {
+        let gap = timing::since(now, due);
+        if gap > self.link.config().longest_exchange() {
             self.link.resume(now);
             self.verify = true;
+        }
+        if gap >= STOOD {
+            self.postpone_task(gap);
         }
     }
 

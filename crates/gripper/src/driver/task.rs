@@ -172,6 +172,14 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
     }
 
+    /// A task's times do not run while nobody looks: the gripper may have ended it long ago.
+    pub(super) fn postpone_task(&mut self, gap: Duration) {
+        if let Some(running) = &mut self.running {
+            running.deadline = running.deadline.map(|due| timing::after(due, gap));
+            running.untaken = None;
+        }
+    }
+
     fn fail_task(&mut self, why: Failure) -> Error {
         let task = self
             .running

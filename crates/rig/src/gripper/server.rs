@@ -55,21 +55,43 @@ pub(super) struct Server {
 pub(super) struct Lies {
     /// Counts added to each position.
     pub position: [i16; 4],
+    /// What a position reads whatever it is.
+    pub shown: [Option<u8>; 4],
+    /// Every position reads anything at all, by this seed.
+    pub scattered: Option<u64>,
     /// What every echo reads.
     pub echo: Option<u8>,
+    /// What every gDTx, or gOBJ, reads.
+    pub contact: Option<u8>,
 }
 
 impl Lies {
-    fn tell(&self, block: &mut [u8; 16]) {
+    fn tell(&self, block: &mut [u8; 16], now: Instant, family: Family) {
         for (axis, offset) in self.position.iter().enumerate() {
             let at = 3 + 3 * axis;
             let told = (i16::from(block[at + 1]) + offset).clamp(0, 255);
-            block[at + 1] = u8::try_from(told).unwrap_or(0);
+            let told = self.shown[axis].unwrap_or(u8::try_from(told).unwrap_or(0));
+            let random = |seed| hash(seed ^ now.as_ticks() << 8 ^ axis as u64) as u8;
+            block[at + 1] = self.scattered.map_or(told, random);
             if let Some(echo) = self.echo {
                 block[at] = echo;
             }
         }
+        if let Some(contact) = self.contact {
+            match family {
+                Family::ThreeFinger => block[1] = contact * 0b0101_0101,
+                _ => block[0] = block[0] & 0x3F | contact << 6,
+            }
+        }
     }
+}
+
+/// A number that looks random (the finaliser of splitmix64).
+fn hash(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9E37_79B9_7F4A_7C15);
+    z = (z ^ z >> 30).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    z = (z ^ z >> 27).wrapping_mul(0x94D0_49BB_1331_11EB);
+    z ^ z >> 31
 }
 
 impl Server {
@@ -137,7 +159,8 @@ impl Server {
             Model::Three(three) => three.status(),
             Model::Two(two) => two.status(),
         };
-        self.lies.tell(&mut block);
+        self.lies
+            .tell(&mut block, self.refreshed, self.config.family);
         if self.config.family != Family::ThreeFinger {
             // Its block ends here.
             block[6..].fill(0);

@@ -240,6 +240,28 @@ pub struct Move {
     pub force: u8,
 }
 
+impl Move {
+    /// The same move again, to be pasted.
+    pub fn again(&self) -> String {
+        self.target.again(&self.verb())
+    }
+
+    /// The same with more patience than now.
+    pub fn patient(&self) -> String {
+        self.target.patient(&self.verb())
+    }
+
+    fn verb(&self) -> String {
+        let to: Vec<String> = self.to.iter().map(u8::to_string).collect();
+        format!(
+            "move --to {} --speed {} --force {}",
+            to.join(","),
+            self.speed,
+            self.force
+        )
+    }
+}
+
 /// Options of `gripper mode`.
 #[derive(Debug, Args)]
 pub struct Mode {

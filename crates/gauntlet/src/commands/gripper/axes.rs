@@ -66,12 +66,13 @@ impl Axes {
 const SCISSOR: usize = 3;
 
 /// The next position to ask for: towards `target`, at most `lead` from where each axis is, and such that no finger can
-/// meet the scissor on the way.
+/// meet the scissor on the way. `told` is the command before, which the status may not show yet.
 pub(super) fn next_command<const X: usize>(
     target: [u8; X],
     status: &Status<X>,
     axes: Axes,
     lead: [u8; X],
+    told: Option<[u8; X]>,
 ) -> [u8; X] {
     let wanted = core::array::from_fn(|axis| {
         let here = status.position[axis];
@@ -85,7 +86,10 @@ pub(super) fn next_command<const X: usize>(
     match axes {
         Axes::Each => {
             // By now it may be as far as what it was told before.
-            let ceiling = core::array::from_fn(|axis| status.position[axis].max(status.echo[axis]));
+            let told = told.unwrap_or(status.position);
+            let ceiling = core::array::from_fn(|axis| {
+                status.position[axis].max(status.echo[axis]).max(told[axis])
+            });
             limits::keep_inside(wanted, &ceiling, &status.position, &target.map(f32::from))
         }
         // The mode keeps fingers and scissor apart.

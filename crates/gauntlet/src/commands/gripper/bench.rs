@@ -1,7 +1,7 @@
 //! Both families of drivers as a person at a bench uses them: asked, watched, within deadlines.
 
 use std::ops::ControlFlow;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use gripper::driver::{Control, Outcome, Task, ThreeFinger, TwoFinger};
 use gripper::registers::{three_finger, two_finger};
@@ -9,7 +9,7 @@ use gripper::travel::Speed;
 use gripper::{Gripper, Status, link};
 
 use crate::interrupt::Interrupt;
-use crate::line::Line;
+use crate::line::{Line, ticks};
 use crate::platform::Clock;
 use crate::tcp;
 
@@ -17,6 +17,8 @@ use crate::tcp;
 pub const ANSWER_WAIT: Duration = Duration::from_secs(3);
 /// Pause between two looks at the line.
 const LOOK: Duration = Duration::from_millis(1);
+/// A longer one the process did not choose.
+const STALL: gripper::Duration = gripper::Duration::from_millis(250);
 
 /// What the verbs need of a driver beyond [`Gripper`].
 pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
@@ -195,7 +197,8 @@ impl Waiter {
         }
     }
 
-    /// Polls the driver until `step` breaks; `None` when the time is over or the end was asked for.
+    /// Polls the driver until `step` breaks; `None` when the time is over or the end was asked for. A time in which the
+    /// process stood still counts as [`STALL`], however long it was: nobody looked.
     pub fn pump<B: Bench<X>, T, const X: usize>(
         &self,
         driver: &mut B,
@@ -206,9 +209,13 @@ impl Waiter {
             Option<Result<Status<X>, gripper::Error>>,
         ) -> ControlFlow<T>,
     ) -> Option<T> {
-        let end = Instant::now() + time;
-        while Instant::now() < end {
+        let mut left = ticks(time).as_ticks();
+        let mut looked = self.clock.now();
+        while left > 0 {
             let now = self.clock.now();
+            let passed = now.as_ticks().saturating_sub(looked.as_ticks());
+            looked = now;
+            left = left.saturating_sub(passed.min(STALL.as_ticks()));
             let heard = driver.poll(now);
             if let ControlFlow::Break(value) = step(driver, now, heard) {
                 return Some(value);

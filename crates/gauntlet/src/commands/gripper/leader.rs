@@ -1,15 +1,16 @@
-//! Leads the gripper status by status, and holds it: what it is told next, and when a move must end.
+//! Leads the gripper status by status: what it is told next, and when a move must end.
 
 use std::time::Duration;
 
-use gripper::registers::Severity;
+use gripper::assurance::Assurance;
 use gripper::travel::{Plausibility, Verdict};
 use gripper::{Activation, Fault, Instant, Motion, Status, timing};
 
-use super::args::Target;
 use super::axes::{Axes, next_command};
 use super::bench::Bench;
 use super::progress::{Judgement, Progress, Rest, STUCK};
+use super::proof::{Proof, Step};
+use super::refusal::{can_hold, may_move};
 use super::{Doing, Move, table};
 use crate::failure::Failure;
 use crate::line::ticks;
@@ -22,10 +23,15 @@ const LEAST_LEAD: u8 = 10;
 const SURE: gripper::Duration = gripper::Duration::from_millis(200);
 /// Without a status for this long the move is given up.
 pub(super) const SILENCE: Duration = Duration::from_secs(1);
-/// Nobody looked for this long: the process stood still, and what was seen before it is of then.
-const STALL: gripper::Duration = timing::STALE_MOTION;
-/// For the hold after a move that did not end by itself: some fifty cycles.
-const HOLD_WAIT: Duration = Duration::from_millis(500);
+/// Nobody looked for this long: what was seen before is of then, and the positions are looked at anew.
+pub(super) const STALL: gripper::Duration = timing::STALE_MOTION;
+/// Nobody looked for this long: whoever began the move may be elsewhere by now, and it ends. As long as a clutch stays
+/// closed without a sign of its person.
+const STOOD: gripper::Duration = gripper::Duration::from_secs(1);
+/// Statuses that must agree after a doubted one before the next is led from.
+const SUSPECT: u8 = 2;
+/// Positions that have not become believable for this long will not.
+const DOUBT: gripper::Duration = gripper::Duration::from_secs(3);
 
 /// How a move ended.
 pub(super) enum End<const X: usize> {
@@ -38,19 +44,25 @@ pub(super) enum End<const X: usize> {
         /// Whether a hold may be written.
         hold: bool,
     },
+    /// Its positions cannot be believed: there is nothing that a hold could be made from.
+    Doubted(Failure),
+    /// The process stood still for so long.
+    Stood(gripper::Duration),
     /// No status came for [`SILENCE`].
     Silent,
 }
 
 /// A move under way.
 pub(super) struct Leader<'a, const X: usize> {
-    options: &'a Move,
-    axes: Axes,
-    target: [u8; X],
-    names: [&'static str; X],
+    pub(super) options: &'a Move,
+    pub(super) axes: Axes,
+    pub(super) target: [u8; X],
+    pub(super) names: [&'static str; X],
     patience: gripper::Duration,
-    judge: Plausibility<X>,
-    progress: Progress<X>,
+    pub(super) judge: Plausibility<X>,
+    pub(super) assurance: Assurance<X>,
+    pub(super) progress: Progress<X>,
+    proof: Proof<X>,
     /// The newest status whose positions are believed.
     pub(super) newest: Status<X>,
     /// What the gripper is told; nothing before its positions are believed.
@@ -58,7 +70,13 @@ pub(super) struct Leader<'a, const X: usize> {
     /// What it was told last, to judge by.
     told: Option<[u8; X]>,
     heard: Instant,
-    looked: Instant,
+    pub(super) looked: Instant,
+    /// Positions in the status before this one, whatever they are worth.
+    pub(super) before: [u8; X],
+    /// How many more statuses must agree before one is led from.
+    suspect: u8,
+    /// Since when they have not been believed.
+    doubted: Option<Instant>,
     /// Writes before the move, and since when one could have left.
     written: u32,
     ready_since: Option<Instant>,
@@ -83,12 +101,17 @@ impl<'a, const X: usize> Leader<'a, X> {
             names: doing.driver.names().1,
             patience,
             judge: Plausibility::new(doing.driver.speed()).patient(patience),
+            assurance: Assurance::default(),
             progress: Progress::new(target, core::array::from_fn(|k| axes.moves(k)), patience),
+            proof: Proof::new(patience),
             newest: status,
             command: None,
             told: None,
             heard: now,
             looked: now,
+            before: status.position,
+            suspect: 0,
+            doubted: None,
             written: doing.driver.counters().writes,
             ready_since: None,
         }
@@ -101,15 +124,16 @@ impl<'a, const X: usize> Leader<'a, X> {
         now: Instant,
         heard: Option<Result<Status<X>, gripper::Error>>,
     ) -> Option<End<X>> {
-        if since(now, self.looked) >= STALL {
+        let stood = since(now, self.looked);
+        self.looked = now;
+        if stood >= STALL {
             // Time in which nobody listened is no silence.
             self.heard = now;
-            self.ready_since = None;
-            self.command = None;
-            self.judge.forget();
-            self.progress.restart();
+            self.forget();
+            if stood >= STOOD && self.has_written(driver) {
+                return Some(End::Stood(stood));
+            }
         }
-        self.looked = now;
         if let Some(Ok(status)) = heard {
             self.heard = now;
             if let Some(end) = self.take(driver, now, &status) {
@@ -142,23 +166,57 @@ impl<'a, const X: usize> Leader<'a, X> {
             self.command = None;
             return self.late(driver, now, status);
         }
-        match self.judge.take(status, now) {
-            Verdict::First => {
-                self.command = None;
-                self.progress.restart();
+        let verdict = self.judge.take(status, now);
+        let assured = self.assurance.take(status, verdict);
+        let end = match verdict {
+            Verdict::Implausible { axis } => Some(End::Doubted(self.implausible(status, axis))),
+            // After a doubted one a single status may agree by chance.
+            Verdict::Used { .. } if assured && self.suspect > 0 => {
+                self.suspect -= 1;
                 None
             }
-            // What it was told stays: a step that cannot be is no reason for another one.
-            Verdict::Doubted { .. } => None,
-            Verdict::Implausible { axis } => {
-                let failure = self.implausible(status, axis);
-                Some(End::Refused {
-                    failure,
-                    hold: true,
-                })
+            Verdict::Used { within } if assured => {
+                self.doubted = None;
+                self.lead(driver, now, status, within)
             }
-            Verdict::Used { within } => self.lead(driver, now, status, within),
-        }
+            // What it was told stays: a step that cannot be is no reason for another one.
+            Verdict::Doubted { .. } if assured => {
+                self.suspect = SUSPECT;
+                None
+            }
+            _ => self.wait_for_agreement(now, status),
+        };
+        self.before = status.position;
+        end
+    }
+
+    /// Nothing is told before the positions agree for a while; they may not do so for ever.
+    fn wait_for_agreement(&mut self, now: Instant, status: &Status<X>) -> Option<End<X>> {
+        self.command = None;
+        self.progress.restart();
+        self.proof.give_up();
+        let start = *self.doubted.get_or_insert(now);
+        let limit = DOUBT + self.patience + self.patience;
+        (since(now, start) >= limit).then(|| End::Doubted(self.disagreeing(status)))
+    }
+
+    /// What was seen is of another time: it is looked at anew.
+    pub(super) fn forget(&mut self) {
+        (self.command, self.ready_since, self.doubted) = (None, None, None);
+        self.suspect = 0;
+        self.judge.forget();
+        self.assurance = Assurance::default();
+        self.progress.restart();
+        self.proof.give_up();
+    }
+
+    /// Whether it was told anything in this move.
+    pub(super) fn command_is_out(&self) -> bool {
+        self.told.is_some()
+    }
+
+    fn has_written<B: Bench<X>>(&self, driver: &B) -> bool {
+        driver.counters().writes != self.written
     }
 
     /// On from a position that is believed.
@@ -173,28 +231,57 @@ impl<'a, const X: usize> Leader<'a, X> {
         if status.activation != Activation::Ready {
             self.ready_since = None;
             self.progress.restart();
-        } else if driver.counters().writes == self.written {
+        } else if !self.has_written(driver) {
             if let Some(end) = self.late(driver, now, status) {
                 return Some(end);
             }
-        } else if let Some(command) = self.told {
-            let echoes = core::array::from_fn(|axis| self.axes.echoes(axis));
-            let echoed = self.progress.repeats(&status.echo, echoes);
-            match self.progress.take(now, status, &command, echoed) {
-                Judgement::Goes => {}
-                Judgement::Stands(rests) => return Some(End::Stands(rests)),
-                Judgement::Stuck(axis) => return Some(self.refused(self.stuck(status, axis))),
-                Judgement::Untaken => return Some(self.refused(self.untaken(status, command))),
-            }
+        } else if let Some(command) = self.told
+            && let Some(end) = self.judge_progress(now, status, &command)
+        {
+            return Some(end);
         }
-        let lead = core::array::from_fn(|axis| match self.progress.still(axis, now) >= SURE {
-            true => LEAD,
-            false => LEAD.saturating_sub(within).max(LEAST_LEAD),
+        let lead = core::array::from_fn(|axis| {
+            // Where it stands on its way it may still be that its position has frozen.
+            let sure =
+                !self.progress.has_moved(axis) || self.proof.is_proven(axis, status.position[axis]);
+            if sure && self.progress.still(axis, now) >= SURE {
+                LEAD
+            } else {
+                LEAD.saturating_sub(within).max(LEAST_LEAD)
+            }
         });
-        let command = next_command(self.target, status, self.axes, lead);
+        let target = self.proof.target(self.target);
+        let command = next_command(target, status, self.axes, lead, self.told);
         self.progress.note_command(self.axes.block(command));
         (self.command, self.told) = (Some(command), Some(command));
         None
+    }
+
+    /// What has become of the commands.
+    fn judge_progress(
+        &mut self,
+        now: Instant,
+        status: &Status<X>,
+        command: &[u8; X],
+    ) -> Option<End<X>> {
+        match self.proof.follow(now, status) {
+            None => {}
+            Some(Step::Goes) => return None,
+            Some(Step::Done) => {
+                self.progress.restart();
+                return None;
+            }
+            Some(Step::Frozen(axis)) => return Some(End::Doubted(self.frozen(status, axis))),
+        }
+        let echoes = core::array::from_fn(|axis| self.axes.echoes(axis));
+        let echoed = self.progress.repeats(&status.echo, echoes);
+        match self.progress.take(now, status, command, echoed) {
+            Judgement::Goes => None,
+            Judgement::Stands(rests) if self.proof.begin(now, &rests, status, command) => None,
+            Judgement::Stands(rests) => Some(End::Stands(rests)),
+            Judgement::Stuck(axis) => Some(self.refused(self.stuck(status, axis))),
+            Judgement::Untaken => Some(self.refused(self.untaken(status, *command))),
+        }
     }
 
     /// The end of a move of which no command could leave for [`STUCK`].
@@ -205,14 +292,18 @@ impl<'a, const X: usize> Leader<'a, X> {
         status: &Status<X>,
     ) -> Option<End<X>> {
         let ready = since(now, *self.ready_since.get_or_insert(now));
-        let told = driver.counters().writes != self.written;
-        let late = !told && ready >= STUCK + self.patience;
+        let late = !self.has_written(driver) && ready >= STUCK + self.patience;
         late.then(|| self.refused(self.too_late(now, status)))
     }
 
     /// Whether a motion may rest on it: one is no older than that itself.
     fn is_fresh(&self, now: Instant, status: &Status<X>) -> bool {
         since(now, status.stamp) <= timing::STALE_MOTION + self.patience
+    }
+
+    /// Whether the newest status is one to hold on.
+    pub(super) fn is_believed(&self, now: Instant) -> bool {
+        self.assurance.is_assured() && self.is_fresh(now, &self.newest)
     }
 
     fn refused(&self, failure: Failure) -> End<X> {
@@ -222,38 +313,12 @@ impl<'a, const X: usize> Leader<'a, X> {
         }
     }
 
-    fn motion(&self, position: [u8; X]) -> Motion<X> {
+    pub(super) fn motion(&self, position: [u8; X]) -> Motion<X> {
         Motion {
             position: self.axes.block(position),
             speed: [self.options.speed; X],
             force: [self.options.force; X],
         }
-    }
-
-    /// Tells the gripper to stay where it is; whether it confirmed that. The Ctrl-C that led here must not cut this wait
-    /// short, so it does not look at it. A status from before a stall is not held on: it is read anew.
-    pub(super) fn hold<B: Bench<X>>(&mut self, doing: &mut Doing<'_, B>) -> bool {
-        let written = doing.driver.counters().writes;
-        let end = std::time::Instant::now() + HOLD_WAIT + 6 * doing.target.settings().patience();
-        let mut told: Option<[u8; X]> = None;
-        let held = |driver: &B| driver.counters().writes != written && driver.accepted();
-        while std::time::Instant::now() < end && !(told.is_some() && held(&doing.driver)) {
-            let now = doing.waiter.clock.now();
-            if told.is_none() && self.is_fresh(now, &self.newest) {
-                told = Some(self.newest.hold());
-            }
-            let motion = told.map(|position| self.motion(position));
-            doing.driver.set_motion(motion, now);
-            // Whatever it says: the time is bounded, and there is nothing else to do.
-            if let Some(Ok(status)) = doing.driver.poll(now)
-                && matches!(self.judge.take(&status, now), Verdict::Used { .. })
-            {
-                self.newest = status;
-            }
-            std::thread::sleep(Duration::from_millis(1));
-        }
-        doing.driver.set_motion(None, doing.waiter.clock.now());
-        told.is_some() && held(&doing.driver)
     }
 
     /// Says where an axis stands that goes no further, far from its target.
@@ -267,128 +332,14 @@ impl<'a, const X: usize> Leader<'a, X> {
             }
         }
     }
-
-    fn implausible(&self, status: &Status<X>, axis: usize) -> Failure {
-        let (name, here, before) = (
-            self.names[axis],
-            status.position[axis],
-            self.newest.position[axis],
-        );
-        Failure::new(
-            format!(
-                "the positions cannot be true: {name} is said to be at {here}, and was at {before} a moment ago; nothing \
-                 moves so fast"
-            ),
-            format!(
-                "looking at the gripper, then {}: a worn position sensor, or two devices that answer as one unit",
-                self.options.target.again("watch --raw")
-            ),
-        )
-    }
-
-    fn stuck(&self, status: &Status<X>, axis: usize) -> Failure {
-        let (name, here, there) = (self.names[axis], status.position[axis], self.target[axis]);
-        Failure::new(
-            format!(
-                "{name} stands at {here} although told to move to {there}, and touches nothing as far as the gripper says"
-            ),
-            format!(
-                "looking at what keeps it from moving and at its 24 V supply, then {}",
-                self.options.target.again("status")
-            ),
-        )
-    }
-
-    fn untaken(&self, status: &Status<X>, command: [u8; X]) -> Failure {
-        let asked = self.axes.block(command);
-        let axis = (0..X)
-            .find(|axis| self.axes.echoes(*axis) && asked[*axis] != status.echo[*axis])
-            .unwrap_or(0);
-        let what = if status.going_to {
-            format!(
-                "the gripper answers but does not take what it is told: {} was asked to be at {}, and its register reads \
-                 back {}",
-                self.names[axis], asked[axis], status.echo[axis]
-            )
-        } else {
-            "the gripper answers but follows no position although told to (gGTO reads back 0)"
-                .to_owned()
-        };
-        Failure::new(
-            what,
-            format!(
-                "ending other programs and gateways that write to it, then {}",
-                self.options.target.again("status --raw")
-            ),
-        )
-    }
-
-    fn too_late(&self, now: Instant, status: &Status<X>) -> Failure {
-        let age = since(now, status.stamp).as_ticks() / 1_000;
-        Failure::new(
-            format!(
-                "the gripper was not told to move: its answers come late, {age} ms after they were asked for, and no \
-                 motion rests on a status that old"
-            ),
-            self.options.target.patient("move"),
-        )
-    }
 }
 
-/// Whether the gripper may be told to move.
-///
-/// # Errors
-/// Any fault it reports, as in `teleop`; or that it is not ready.
-pub(super) fn may_move<const X: usize>(status: &Status<X>, target: &Target) -> Result<(), Failure> {
-    if status.fault != Fault::None {
-        let next = match (status.fault, status.activation) {
-            // It is activated: only a new start clears that.
-            (Fault::ActivationNeeded | Fault::NotActivated, Activation::Ready) => format!(
-                "{}, then {}: the gripper lets go, then its fingers move",
-                target.again("reset"),
-                target.again("activate")
-            ),
-            (Fault::ActivationNeeded | Fault::NotActivated, _) => {
-                format!("{}: {}", target.again("activate"), status.fault.action())
-            }
-            _ => status.fault.action().to_owned(),
-        };
-        let (code, sentence) = (status.fault.code(), status.fault.sentence());
-        // The sentence ends the thought; what follows it here goes on.
-        let sentence = sentence.trim_end_matches('.');
-        let not_activated = match status.activation {
-            Activation::Reset => " (it is not activated)",
-            _ => "",
-        };
-        return Err(Failure::new(
-            format!("it does not move on: fault {code:02X}: {sentence}{not_activated}"),
-            next,
-        ));
-    }
-    match status.activation {
-        Activation::Ready => Ok(()),
-        Activation::Reset => Err(Failure::new(
-            "it cannot move: the gripper is not activated",
-            format!(
-                "{}: the fingers move through their whole range",
-                target.again("activate")
-            ),
-        )),
-        Activation::Activating | Activation::ChangingMode => Err(Failure::new(
-            "it cannot move: the gripper is busy activating or changing its mode",
-            "again in a few seconds",
-        )),
-    }
-}
-
-/// Whether a hold may be written: rACT in it would activate a gripper that is not.
-fn can_hold<const X: usize>(status: &Status<X>) -> bool {
-    status.activation == Activation::Ready
-        && status.fault.severity() != Severity::Major
-        && status.fault != Fault::Releasing
-}
-
-fn since(now: Instant, then: Instant) -> gripper::Duration {
+/// Time from `then` to `now`; nothing where `then` is later.
+pub(super) fn since(now: Instant, then: Instant) -> gripper::Duration {
     now.checked_duration_since(then)
         .unwrap_or(gripper::Duration::from_ticks(0))
 }
+
+#[cfg(test)]
+#[path = "leader_tests.rs"]
+mod tests;

@@ -3,36 +3,31 @@
 mod args;
 mod axes;
 mod bench;
+mod hold;
 mod leader;
 mod motion;
 mod progress;
+mod proof;
+mod refusal;
+mod show;
 mod table;
 mod task;
 
-use std::ops::ControlFlow;
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::Result;
 use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::registers::{Kind, Severity};
-use gripper::{Activation, Status};
+use gripper::{Activation, Fault, Status};
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::line::Line;
 use crate::tell::Tell;
-use crate::{out, say};
 
 pub use args::{Grasp, Gripper, Mode, Model, Move, Release, Target, Verb, Watch};
 pub(super) use bench::{Bench, Waiter};
-
-/// `watch` shows changes at most this often.
-const WATCH_STEP: Duration = Duration::from_millis(100);
-/// A line without an answer for this long at its end is dead.
-const WATCH_SILENCE: Duration = Duration::from_secs(1);
-/// And says at least this often that it still does.
-const WATCH_BEAT: Duration = Duration::from_secs(1);
 
 impl Verb {
     fn target(&self) -> &Target {
@@ -140,19 +135,48 @@ fn act<B: Bench<X>, const X: usize>(
         tell,
     };
     match &options.verb {
-        Verb::Status(_) => {}
-        Verb::Activate(_) => doing.activate(&status)?,
-        Verb::Move(options) => motion::run(&mut doing, options, &status)?,
-        Verb::Mode(options) => doing.mode(options.mode)?,
-        Verb::Release(options) => doing.release(options.closing)?,
+        Verb::Status(_) => doing.show(None),
+        Verb::Activate(_) => {
+            doing.activate(&status)?;
+            doing.show(Some(("activated", |status| {
+                status.activation == Activation::Ready && !is_refusing(status)
+            })))
+        }
+        Verb::Move(options) => {
+            // What is shown is what the end was judged by: another look could bring a position that is not believed.
+            let status = motion::run(&mut doing, options, &status)?;
+            doing.show_status(&status)
+        }
+        Verb::Mode(options) => {
+            doing.mode(options.mode)?;
+            doing.show(Some(("in its new mode", |status| {
+                status.activation == Activation::Ready
+            })))
+        }
+        Verb::Release(options) => {
+            doing.release(options.closing)?;
+            doing.show(Some(("at the end of its release", |status| {
+                status.fault == Fault::Released
+            })))
+        }
         Verb::Reset(_) => {
             tell.say(format_args!("resetting: the gripper lets go"));
             doing.driver.reset();
             doing.finish()?;
+            doing.show(Some(("reset", |status| {
+                status.activation == Activation::Reset
+            })))
         }
-        Verb::Watch(options) => return doing.watch(options.seconds),
+        Verb::Watch(options) => doing.watch(options.seconds),
     }
-    doing.show()
+}
+
+/// Whether it says that it takes no motion, whatever it says of its activation.
+fn is_refusing<const X: usize>(status: &Status<X>) -> bool {
+    matches!(
+        status.fault.severity(),
+        Severity::Priority | Severity::Major
+    )
 }
 
 fn no_answer<B: Bench<X>, const X: usize>(
@@ -303,98 +327,5 @@ impl<B> Doing<'_, B> {
             "automatic release: the fingers move slowly; it ends in fault 0F, as it should"
         ));
         self.finish()
-    }
-
-    /// Reads once more and shows what is.
-    fn show<const X: usize>(&mut self) -> Result<()>
-    where
-        B: Bench<X>,
-    {
-        let patience = self.target.settings().patience();
-        let status = self
-            .waiter
-            .status(&mut self.driver, patience)
-            .map_err(|_| {
-                if self.waiter.interrupt.asked() {
-                    let what =
-                        "interrupted after it was done, before the state could be read again";
-                    return Failure::new(what, self.target.again("status"));
-                }
-                Failure::new("the gripper stopped answering", self.target.doctor())
-            })?;
-        let (place, raw) = (self.place(), self.target.raw);
-        if self.target.json {
-            return out::json(&table::json(&self.driver, &status, &place, raw));
-        }
-        for line in table::lines(&self.driver, &status, &place, raw) {
-            say!("{line}");
-        }
-        Ok(())
-    }
-
-    fn watch<const X: usize>(&mut self, time: Duration) -> Result<()>
-    where
-        B: Bench<X>,
-    {
-        let (place, raw, json) = (self.place(), self.target.raw, self.target.json);
-        let patience = 4 * self.target.settings().patience();
-        let started = Instant::now();
-        if !json {
-            say!(
-                "   time    state; each axis: position/asked and what it does (0 open, 255 closed)"
-            );
-        }
-        let mut shown: Option<(Instant, String)> = None;
-        let (mut answered, mut looked) = (started, started);
-        self.waiter
-            .pump(&mut self.driver, time, |driver, _, heard| {
-                if heard.as_ref().is_some_and(Result::is_ok) || looked.elapsed() >= WATCH_STEP {
-                    // Time in which nobody listened is no silence.
-                    answered = Instant::now();
-                }
-                looked = Instant::now();
-                let text = match heard {
-                    None => return ControlFlow::<()>::Continue(()),
-                    Some(Ok(status)) if json => {
-                        table::json(driver, &status, &place, raw).to_string()
-                    }
-                    Some(Ok(status)) => table::line(driver, &status, raw),
-                    Some(Err(error)) => {
-                        let (what, next) = match driver.line_error() {
-                            Some(error) => (error.to_string(), Some(error.next_step())),
-                            None => (error.to_string(), None),
-                        };
-                        match (json, next) {
-                            (false, _) => what,
-                            (true, None) => serde_json::json!({ "error": what }).to_string(),
-                            (true, Some(next)) => {
-                                serde_json::json!({ "error": what, "try": next }).to_string()
-                            }
-                        }
-                    }
-                };
-                let due = shown.as_ref().is_none_or(|(at, last)| {
-                    let since = at.elapsed();
-                    since >= WATCH_BEAT || (since >= WATCH_STEP && *last != text)
-                });
-                if due {
-                    if json {
-                        say!("{text}");
-                    } else {
-                        say!("{:7.1} s  {text}", started.elapsed().as_secs_f32());
-                    }
-                    shown = Some((Instant::now(), text));
-                }
-                ControlFlow::Continue(())
-            });
-        let silent = answered.elapsed();
-        if silent >= WATCH_SILENCE + patience && !self.waiter.interrupt.asked() {
-            let what = format!(
-                "the gripper has not answered for {:.0} s",
-                silent.as_secs_f32()
-            );
-            return Err(Failure::new(what, self.target.doctor()).into());
-        }
-        Ok(())
     }
 }

@@ -13,13 +13,15 @@ use gripper::{Activation, Fault, Status, space};
 use super::args::Target;
 use super::axes::Axes;
 use super::bench::Bench;
-use super::leader::{End, LEAD, Leader, SILENCE, may_move};
+use super::leader::{End, LEAD, Leader, SILENCE};
+use super::refusal::may_move;
 use super::{Doing, Move};
 use crate::failure::Failure;
 
 /// The slowest full stroke takes 7 s; one that needs longer is stuck.
 const MOVE_WAIT: Duration = Duration::from_secs(15);
-/// Moves.
+
+/// Moves; gives the status it ended with, whose positions are believed.
 ///
 /// # Errors
 /// A failure where the gripper cannot, or does not.
@@ -27,7 +29,7 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
     doing: &mut Doing<'_, B>,
     options: &Move,
     status: &Status<X>,
-) -> Result<()> {
+) -> Result<Status<X>> {
     let target = positions::<X>(&options.to, doing.driver.names().0)?;
     let status = &heard_again(doing, status);
     may_move(status, doing.target)?;
@@ -47,35 +49,58 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
     let written = doing.driver.counters().writes;
     let ended = approach(doing, &mut leader);
     doing.driver.set_motion(None, doing.waiter.clock.now());
-    match ended {
+    let written = doing.driver.counters().writes != written;
+    Err(match ended {
         Some(End::Stands(rests)) => {
             leader.tell_limits(doing, &rests);
-            Ok(())
+            return Ok(leader.newest);
         }
-        Some(End::Refused { failure, hold }) => {
-            let written = doing.driver.counters().writes != written;
-            Err(if !hold || !written {
-                failure
-            } else if leader.hold(doing) {
-                Failure::new(
-                    format!("{failure}; the gripper is held where it is"),
-                    failure.next_step(),
-                )
-            } else {
-                unsure(
-                    &format!("{failure}; the hold was not confirmed"),
-                    doing.target,
-                )
-            }
-            .into())
+        Some(End::Refused { failure, hold }) if !hold || !written => failure,
+        Some(End::Refused { failure, .. }) => {
+            let next = failure.next_step().to_owned();
+            held(doing, &mut leader, &failure.to_string(), next)
         }
-        Some(End::Silent) => Err(unsure(
+        Some(End::Doubted(failure)) => not_held(&failure, written),
+        Some(End::Stood(time)) => {
+            let seconds = time.as_ticks() as f64 / 1e6;
+            let why = format!("the process stood still for {seconds:.1} s during the move");
+            held(doing, &mut leader, &why, options.again())
+        }
+        Some(End::Silent) => unsure(
             "the gripper stopped answering during the move",
             doing.target,
-        )
-        .into()),
-        None => Err(given_up(doing, &mut leader, written).into()),
+        ),
+        None => given_up(doing, &mut leader, written),
     }
+    .into())
+}
+
+/// Holds, and says whether that was confirmed.
+fn held<B: Bench<X>, const X: usize>(
+    doing: &mut Doing<'_, B>,
+    leader: &mut Leader<X>,
+    why: &str,
+    next: String,
+) -> Failure {
+    if leader.hold(doing) {
+        Failure::new(format!("{why}; the gripper is held where it is"), next)
+    } else {
+        unsure(&format!("{why}; the hold was not confirmed"), doing.target)
+    }
+}
+
+/// A hold needs positions. Where they cannot be believed the last command is the best there is: it was made from ones that
+/// were.
+fn not_held(failure: &Failure, written: bool) -> Failure {
+    let what = if written {
+        format!(
+            "{failure}. Nothing more was written: the gripper goes where it was told last, at most {LEAD} counts from where it \
+             was believed to be"
+        )
+    } else {
+        format!("{failure}. Nothing was written")
+    };
+    Failure::new(what, failure.next_step())
 }
 
 /// A 2-Finger gripper that nobody spoke to for a second says so (fault 09) until it has been asked again.
@@ -104,19 +129,19 @@ fn heard_again<B: Bench<X>, const X: usize>(
 fn given_up<B: Bench<X>, const X: usize>(
     doing: &mut Doing<'_, B>,
     leader: &mut Leader<X>,
-    written: u32,
+    written: bool,
 ) -> Failure {
     let interrupted = doing.waiter.interrupt.asked();
-    if doing.driver.counters().writes == written {
+    if !written {
         return if interrupted {
             Failure::new(
                 "interrupted before the gripper was told to move",
-                "the same again",
+                leader.options.again(),
             )
         } else {
             Failure::new(
                 "no command could leave in time: no status came that a motion may rest on",
-                doing.target.patient("move"),
+                leader.options.patient(),
             )
         };
     }
@@ -124,21 +149,17 @@ fn given_up<B: Bench<X>, const X: usize>(
         let what = "the gripper is still putting its scissor where its mode has it, which no command stops";
         return unsure(what, doing.target);
     }
-    let why = if interrupted {
-        "interrupted".to_owned()
-    } else {
-        let seconds = move_wait(doing.target).as_secs();
-        format!("the gripper was not there {seconds} s after it was told to move")
-    };
-    if !leader.hold(doing) {
-        unsure(&format!("{why}; the hold was not confirmed"), doing.target)
-    } else if interrupted {
+    if interrupted && leader.hold(doing) {
         let what = "interrupted: the gripper is held where it is";
-        Failure::new(what, doing.target.again("status"))
-    } else {
-        let what = format!("{why}; it is held where it is");
-        Failure::new(what, doing.target.doctor())
+        return Failure::new(what, doing.target.again("status"));
     }
+    if interrupted {
+        let what = "interrupted; the hold was not confirmed";
+        return unsure(what, doing.target);
+    }
+    let seconds = move_wait(doing.target).as_secs();
+    let why = format!("the gripper was not there {seconds} s after it was told to move");
+    held(doing, leader, &why, doing.target.doctor())
 }
 
 /// Nobody can say what the gripper does; how far it may go is known.

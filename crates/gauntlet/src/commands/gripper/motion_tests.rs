@@ -21,7 +21,7 @@ fn status<const X: usize>(position: [u8; X]) -> Status<X> {
 fn no_command_is_more_than_forty_counts_from_where_an_axis_is() {
     for here in 0..=255 {
         for target in 0..=255 {
-            let [next] = next_command([target], &status([here]), Axes::Each, [LEAD]);
+            let [next] = next_command([target], &status([here]), Axes::Each, [LEAD], None);
             assert!(next.abs_diff(here) <= LEAD);
             assert!(next.abs_diff(target) <= here.abs_diff(target));
             assert!(next != here || here == target);
@@ -32,6 +32,7 @@ fn no_command_is_more_than_forty_counts_from_where_an_axis_is() {
         &status([10, 20, 30, 137]),
         Axes::Fingers,
         [LEAD; 4],
+        None,
     );
     assert_eq!(next, [50, 60, 70, 137]);
     let next = next_command(
@@ -39,6 +40,7 @@ fn no_command_is_more_than_forty_counts_from_where_an_axis_is() {
         &status([10, 20, 30, 137]),
         Axes::Scissor,
         [LEAD; 4],
+        None,
     );
     assert_eq!(Axes::Scissor.block(next), [177, 20, 30, 177]);
 }
@@ -48,7 +50,7 @@ fn a_way_that_ends_where_fingers_and_scissor_are_apart_never_leads_through_where
     // The scissor is closed and must open before the fingers may close.
     let (mut here, target) = ([20, 20, 20, 230], [250, 250, 250, 100]);
     for _ in 0..200 {
-        let next = next_command(target, &status(here), Axes::Each, [LEAD; 4]);
+        let next = next_command(target, &status(here), Axes::Each, [LEAD; 4], None);
         let corner = core::array::from_fn(|axis| next[axis].max(here[axis]));
         assert!(space::contains_counts(&corner), "{here:?} {next:?}");
         // The fingers are the faster ones.

@@ -5,8 +5,10 @@ use std::collections::VecDeque;
 
 use gripper::{Contact, Duration, Instant, Status};
 
+use super::leader::since;
+
 /// An axis within so many counts of its target is there: positions are rounded, and motors stop a count early or late.
-const NEAR: u8 = 2;
+pub(super) const NEAR: u8 = 2;
 /// An axis that moved by so many counts towards its target was seen to move.
 const SEEN: u8 = 3;
 /// A position that changes by no more than this stands.
@@ -14,7 +16,7 @@ const FLICKER: u8 = 1;
 /// Software limits lie at most so far from either mechanical stop: there an axis may stand from the start.
 const STOPS: (u8, u8) = (20, 225);
 /// Standing for this long ends a motion where the gripper says so too, at the target or at an object it was seen to move to.
-const STANDS: Duration = Duration::from_millis(100);
+pub(super) const STANDS: Duration = Duration::from_millis(100);
 /// Standing at the target for this long ends it whatever the gripper says.
 const STANDS_THERE: Duration = Duration::from_millis(300);
 /// Standing short of the target, seen to move there: a software limit. Longer, because a motor may pause.
@@ -101,6 +103,12 @@ impl<const X: usize> Progress<X> {
         track.map_or(Duration::from_ticks(0), |track| since(now, track.still))
     }
 
+    /// Whether an axis was seen to move towards its target.
+    pub(super) fn has_moved(&self, axis: usize) -> bool {
+        let track = self.tracks.get(axis).copied().flatten();
+        track.is_some_and(|track| track.came >= SEEN)
+    }
+
     /// Takes a status heard at `now` whose positions are believed. `command` is what the axes have been told, as the
     /// gripper should repeat it in `echo`; both only on the axes the gripper lets follow their own positions.
     pub(super) fn take(
@@ -151,6 +159,11 @@ impl<const X: usize> Progress<X> {
         self.commands.iter().any(same)
     }
 
+    /// Whether one of the newest commands told this axis to be at `echo`.
+    pub(super) fn was_told(&self, axis: usize, echo: u8) -> bool {
+        self.commands.iter().any(|command| command[axis] == echo)
+    }
+
     fn follow(&mut self, axis: usize, now: Instant, here: u8, command: u8) {
         let elsewhere = here.abs_diff(command) > NEAR;
         let Some(track) = &mut self.tracks[axis] else {
@@ -190,17 +203,20 @@ impl<const X: usize> Progress<X> {
             let says = contact != Contact::Moving;
             return (stands(STANDS_THERE) || (says && stands(STANDS))).then_some(Rest::Target);
         }
+        // Beyond its target it is no object and no limit that keeps it from there.
+        if is_beyond(track.start, target, here) {
+            return None;
+        }
         // A touch that no command presses against is one of an earlier motion.
         let pressed = match contact {
             Contact::ContactClosing => command > here,
             Contact::ContactOpening => command < here,
             Contact::Moving => return None,
             Contact::AtPosition => {
-                let (open, closed) = STOPS;
-                let at_stop =
-                    (command < here && here <= open) || (command > here && here >= closed);
+                let at_stop = is_at_stop(here, command);
                 let limit = (moved && stands(STANDS_SHORT)) || (at_stop && stands(STUCK));
-                return (limit && command != here).then_some(Rest::Limit);
+                let towards = (command > here) == (target > here) && command != here;
+                return (limit && towards).then_some(Rest::Limit);
             }
         };
         (pressed && (stands(STUCK) || (moved && stands(STANDS)))).then_some(Rest::Object)
@@ -216,9 +232,16 @@ impl<const X: usize> Progress<X> {
     }
 }
 
-fn since(now: Instant, then: Instant) -> Duration {
-    now.checked_duration_since(then)
-        .unwrap_or(Duration::from_ticks(0))
+/// Whether an axis at `here` that is told to go to `command` is so near the stop there that a software limit is normal.
+pub(super) fn is_at_stop(here: u8, command: u8) -> bool {
+    let (open, closed) = STOPS;
+    (command < here && here <= open) || (command > here && here >= closed)
+}
+
+/// Whether an axis that was to move from `start` to `target` has gone past it.
+fn is_beyond(start: u8, target: u8, here: u8) -> bool {
+    (start.saturating_add(NEAR) < target && here > target)
+        || (start > target.saturating_add(NEAR) && here < target)
 }
 
 #[cfg(test)]

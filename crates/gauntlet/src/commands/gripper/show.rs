@@ -1,0 +1,214 @@
+//! What a verb shows: the state at its end, or every change.
+
+use std::ops::ControlFlow;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use gripper::travel::{DOUBTS, Plausibility, Verdict};
+use gripper::{Activation, Fault, Status};
+
+use super::bench::Bench;
+use super::{Doing, is_refusing, table};
+use crate::failure::Failure;
+use crate::{out, say, words};
+
+/// `watch` shows changes at most this often.
+const WATCH_STEP: Duration = Duration::from_millis(100);
+/// A line without an answer for this long at its end is dead.
+const WATCH_SILENCE: Duration = Duration::from_secs(1);
+/// And says at least this often that it still does.
+const WATCH_BEAT: Duration = Duration::from_secs(1);
+
+/// Statuses that are compared before one is shown, and the longest wait for them.
+const COMPARED: u8 = 8;
+const COMPARE_WAIT: Duration = Duration::from_millis(300);
+
+/// What a verb has come to, as a person says it, and whether a status bears it out.
+pub(super) type Claim<const X: usize> = (&'static str, fn(&Status<X>) -> bool);
+
+impl<B> Doing<'_, B> {
+    /// Reads some times more and shows what is.
+    ///
+    /// # Errors
+    /// A failure where the gripper no longer answers, where its statuses do not bear out what was done, or where its
+    /// positions cannot be true; what it says is shown before.
+    pub(super) fn show<const X: usize>(&mut self, claim: Option<Claim<X>>) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        let patience = self.target.settings().patience();
+        let first = self
+            .waiter
+            .status(&mut self.driver, patience)
+            .map_err(|_| {
+                if self.waiter.interrupt.asked() {
+                    let what =
+                        "interrupted after it was done, before the state could be read again";
+                    return Failure::new(what, self.target.again("status"));
+                }
+                Failure::new("the gripper stopped answering", self.target.doctor())
+            })?;
+        let (status, jumps) = self.compare(first);
+        self.show_status(&status)?;
+        if let Some((what, bears_out)) = claim
+            && !bears_out(&status)
+        {
+            return Err(self.contradicts(what, &status).into());
+        }
+        if jumps {
+            return Err(Failure::new(
+                "the positions cannot be true: they jump from status to status as nothing moves",
+                format!(
+                    "looking at the gripper, then {}: a worn position sensor, or two devices that answer as one unit",
+                    self.target.again("watch --raw")
+                ),
+            )
+            .into());
+        }
+        Ok(())
+    }
+
+    /// The newest of some statuses, and whether their positions jump.
+    fn compare<const X: usize>(&mut self, first: Status<X>) -> (Status<X>, bool)
+    where
+        B: Bench<X>,
+    {
+        let patience = self.target.settings().patience();
+        let mut judge =
+            Plausibility::new(self.driver.speed()).patient(crate::line::ticks(4 * patience));
+        judge.take(&first, first.stamp);
+        let (mut newest, mut seen, mut doubts) = (first, 1, 0);
+        let waiter = self.waiter.clone();
+        waiter.pump(
+            &mut self.driver,
+            COMPARE_WAIT + 4 * patience,
+            |_, now, heard| {
+                if let Some(Ok(status)) = heard {
+                    if let Verdict::Doubted { .. } | Verdict::Implausible { .. } =
+                        judge.take(&status, now)
+                    {
+                        doubts += 1;
+                    }
+                    newest = status;
+                    seen += 1;
+                }
+                if seen >= COMPARED {
+                    return ControlFlow::Break(());
+                }
+                ControlFlow::Continue(())
+            },
+        );
+        (newest, doubts >= DOUBTS)
+    }
+
+    /// It said that it was done, and its statuses say otherwise.
+    fn contradicts<const X: usize>(&self, what: &str, status: &Status<X>) -> Failure {
+        let state = words::activation(status.activation);
+        let fault = match status.fault {
+            Fault::None => String::new(),
+            fault => format!(
+                ", fault {:02X}: {}",
+                fault.code(),
+                fault.sentence().trim_end_matches('.')
+            ),
+        };
+        Failure::new(
+            format!(
+                "the gripper was said to be {what}, and its status does not bear that out: {state}{fault}"
+            ),
+            if is_refusing(status) && status.activation == Activation::Ready {
+                format!(
+                    "{}, then {}: the gripper lets go, then its fingers move",
+                    self.target.again("reset"),
+                    self.target.again("activate")
+                )
+            } else {
+                format!(
+                    "looking at the gripper, then {}",
+                    self.target.again("watch --raw")
+                )
+            },
+        )
+    }
+
+    /// Shows `status`.
+    pub(super) fn show_status<const X: usize>(&self, status: &Status<X>) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        let (place, raw) = (self.place(), self.target.raw);
+        if self.target.json {
+            return out::json(&table::json(&self.driver, status, &place, raw));
+        }
+        for line in table::lines(&self.driver, status, &place, raw) {
+            say!("{line}");
+        }
+        Ok(())
+    }
+
+    pub(super) fn watch<const X: usize>(&mut self, time: Duration) -> Result<()>
+    where
+        B: Bench<X>,
+    {
+        let (place, raw, json) = (self.place(), self.target.raw, self.target.json);
+        let patience = 4 * self.target.settings().patience();
+        let started = Instant::now();
+        if !json {
+            say!(
+                "   time    state; each axis: position/asked and what it does (0 open, 255 closed)"
+            );
+        }
+        let mut shown: Option<(Instant, String)> = None;
+        let (mut answered, mut looked) = (started, started);
+        self.waiter
+            .pump(&mut self.driver, time, |driver, _, heard| {
+                if heard.as_ref().is_some_and(Result::is_ok) || looked.elapsed() >= WATCH_STEP {
+                    // Time in which nobody listened is no silence.
+                    answered = Instant::now();
+                }
+                looked = Instant::now();
+                let text = match heard {
+                    None => return ControlFlow::<()>::Continue(()),
+                    Some(Ok(status)) if json => {
+                        table::json(driver, &status, &place, raw).to_string()
+                    }
+                    Some(Ok(status)) => table::line(driver, &status, raw),
+                    Some(Err(error)) => {
+                        let (what, next) = match driver.line_error() {
+                            Some(error) => (error.to_string(), Some(error.next_step())),
+                            None => (error.to_string(), None),
+                        };
+                        match (json, next) {
+                            (false, _) => what,
+                            (true, None) => serde_json::json!({ "error": what }).to_string(),
+                            (true, Some(next)) => {
+                                serde_json::json!({ "error": what, "try": next }).to_string()
+                            }
+                        }
+                    }
+                };
+                let due = shown.as_ref().is_none_or(|(at, last)| {
+                    let since = at.elapsed();
+                    since >= WATCH_BEAT || (since >= WATCH_STEP && *last != text)
+                });
+                if due {
+                    if json {
+                        say!("{text}");
+                    } else {
+                        say!("{:7.1} s  {text}", started.elapsed().as_secs_f32());
+                    }
+                    shown = Some((Instant::now(), text));
+                }
+                ControlFlow::Continue(())
+            });
+        let silent = answered.elapsed();
+        if silent >= WATCH_SILENCE + patience && !self.waiter.interrupt.asked() {
+            let what = format!(
+                "the gripper has not answered for {:.0} s",
+                silent.as_secs_f32()
+            );
+            return Err(Failure::new(what, self.target.doctor()).into());
+        }
+        Ok(())
+    }
+}
