@@ -14,13 +14,15 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::State;
+use bridge::telemetry::Sent;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::failure::OrFail;
 use crate::interrupt::Interrupt;
 use crate::live::{Key, Live};
 use crate::platform::Clock;
-use crate::record::{Record, Sort};
+use crate::record::{AXES, Record, Sort};
 use crate::session::{Order, Session, Snapshot};
 use crate::session_log::SessionLog;
 use crate::{note, out};
@@ -257,13 +259,15 @@ impl Run {
 
     /// Opens the clutch, and waits until the hold has left.
     fn hold_for_a_while(&mut self) -> Result<()> {
+        let released = self.clock.now();
         self.release();
         let end = Instant::now() + SUSPEND_HOLD;
         let mut held = false;
         while !held && Instant::now() < end && !self.interrupt.sleep(ROUND) {
             self.round()?;
             held = self.session.snapshot().is_some_and(|seen| {
-                !seen.state.is_moving() && seen.sent.is_none_or(|sent| !sent.follows)
+                let holds = |sent: Sent<AXES>| !sent.follows && sent.decided > released;
+                seen.state == State::Idle && seen.sent.is_none_or(holds)
             });
         }
         Ok(())
