@@ -316,6 +316,11 @@ fn every_signal_that_can_be_caught_ends_in_order() {
         Signal::IO,
         Signal::POWER,
         Signal::STKFLT,
+        // What the processor raises for a fault; here somebody sends it.
+        Signal::ILL,
+        Signal::FPE,
+        Signal::SEGV,
+        Signal::BUS,
     ] {
         if signal == Signal::HUP && hang_up_is_ignored() {
             println!(
