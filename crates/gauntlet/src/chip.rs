@@ -13,16 +13,16 @@ pub use view::standing_faults;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::Epoch;
 use bridge::clutch::HeartbeatRefusal;
 use bridge::protocol::message::{Counters, Sample, Status};
+use bridge::{Epoch, HoldReason};
 
 use crate::failure::{Failure, OrFail};
 use crate::host_link::{Error, Heartbeat, HostLink};
 use crate::interrupt::Interrupt;
 use crate::live::{Key, Live};
 use crate::out;
-use crate::run::{End, Ending, first_failure};
+use crate::run::{End, Ending, Lasting, MOVED_COUNTS, Obeyed, first_failure};
 use crate::stats::{Percentiles, Rate};
 use crate::stopped::Stopped;
 
@@ -36,8 +36,9 @@ const COUNT_EVERY: Duration = Duration::from_secs(1);
 pub const SAMPLE_MS: u16 = 50;
 /// Heartbeats without an answer, in a row, after which nobody is there: 2 s.
 const MISSED_BEATS: u32 = 20;
-/// Counts of position that are a motion.
-const MOVED_COUNTS: u8 = 4;
+
+/// Frames of a watch that say something of the glove.
+const LEAST_FRAMES: u32 = 10;
 
 /// How a watch goes.
 #[derive(Debug)]
@@ -108,6 +109,10 @@ pub struct Watch<'a> {
     started: Instant,
     start_positions: Option<Vec<u8>>,
     first_motion: Option<Duration>,
+    /// Whether the gripper went where it was told.
+    obeyed: Obeyed,
+    /// What holds it.
+    held: Lasting<HoldReason>,
     counted: Option<(Instant, Counters)>,
     cycles_per_s: f64,
 }
@@ -132,6 +137,8 @@ impl<'a> Watch<'a> {
             started: Instant::now(),
             start_positions: None,
             first_motion: None,
+            obeyed: Obeyed::default(),
+            held: Lasting::default(),
             counted: None,
             cycles_per_s: 0.0,
         }
@@ -151,7 +158,7 @@ impl<'a> Watch<'a> {
         self.link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
         self.started = Instant::now();
         let end = self.watch(options, each);
-        let ending = self.ending();
+        let ending = self.ending(&before);
         let seconds = self.started.elapsed().as_secs_f64();
         let stopped = self.engaged.then(|| stop(self.link));
         let known = self.counted.map_or(before, |(_, counters)| counters);
@@ -166,14 +173,29 @@ impl<'a> Watch<'a> {
         })
     }
 
-    fn ending(&self) -> Option<Ending> {
-        let status = self.status.as_ref()?;
-        Some(Ending::new(
-            status.state,
-            status.glove_answers,
-            status.gripper.is_some(),
-            self.expired && !self.attended,
-        ))
+    fn ending(&mut self, before: &Counters) -> Option<Ending> {
+        let status = self.status.clone()?;
+        Some(Ending {
+            state: status.state,
+            attended: self.attended,
+            expired: self.expired,
+            held: self.held.lasted(Instant::now()),
+            glove_answers: status.glove_answers,
+            useless: self.useless(before, &status),
+            gripper_answers: status.gripper.is_some(),
+            disobeyed: self.obeyed.fault(),
+        })
+    }
+
+    /// Why no frame of the whole watch could be used. What else makes frames useless (no weights, no calibration) is told as
+    /// what it is.
+    fn useless(&mut self, before: &Counters, status: &Status) -> Option<String> {
+        let (_, counted) = self.counted?;
+        let grown = counted.since(before);
+        let all = grown.frames >= LEAST_FRAMES && grown.unusable_frames >= grown.frames;
+        let ready = all && status.active_slot.is_some();
+        let calibrated = ready && self.link.health().ok()?.calibration.is_calibrated;
+        calibrated.then(|| "sensors are lost, frozen or give what is no orientation".to_owned())
     }
 
     fn watch(
@@ -204,6 +226,8 @@ impl<'a> Watch<'a> {
                 asked_status = Some(beat);
                 self.status = Some(self.link.status().map_err(Failure::from)?);
             }
+            let reason = self.status.as_ref().and_then(|s| s.state.hold_reason());
+            self.held.look(reason, beat);
             self.count(beat + HEARTBEAT)?;
             let rest = HEARTBEAT.saturating_sub(beat.elapsed());
             for sample in self.link.listen(rest).map_err(Failure::from)? {
@@ -310,6 +334,9 @@ impl<'a> Watch<'a> {
         }
         self.samples += 1;
         if sample.state.is_moving() {
+            // What is in an axis' way is not told on this wire.
+            self.obeyed
+                .look(now_us, &sample.command, &sample.position, |_| false);
             if let Some(us) = sample.latency_us {
                 self.latency.add(us.into());
             }

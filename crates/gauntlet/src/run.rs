@@ -3,7 +3,9 @@
 pub mod calibrating;
 mod clutch;
 mod ending;
+mod lasting;
 mod numbers;
+mod obeyed;
 mod replies;
 mod shown;
 mod summary;
@@ -14,8 +16,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::State;
 use bridge::telemetry::Sent;
+use bridge::{HoldReason, State};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::failure::OrFail;
@@ -29,7 +31,9 @@ use crate::{note, out};
 use shown::Shown;
 
 pub use ending::{Ending, Finished, first_failure};
+pub use lasting::Lasting;
 pub use numbers::Numbers;
+pub use obeyed::{MOVED_COUNTS, Obeyed};
 pub use replies::Failed;
 pub use summary::Summary;
 
@@ -90,6 +94,10 @@ pub struct Run {
     attended: bool,
     heartbeat: Option<Instant>,
     shown: Shown,
+    /// What holds the gripper.
+    held: Lasting<HoldReason>,
+    /// No frame of the glove can be used.
+    useless: Lasting<()>,
     /// The view was not taken for so long that nobody sees it.
     unseen: bool,
     /// When a file grew to its limit.
@@ -122,6 +130,8 @@ impl Run {
             attended: false,
             heartbeat: None,
             shown: Shown::default(),
+            held: Lasting::default(),
+            useless: Lasting::default(),
             unseen: false,
             file_limit: None,
             ending: None,
@@ -201,12 +211,23 @@ impl Run {
     pub fn drive(&mut self, options: &Options) -> Result<End> {
         self.start_log()?;
         let driven = self.watch(options);
-        let unattended = self.expired && !self.attended;
-        self.ending = self
-            .session
-            .snapshot()
-            .map(|seen| Ending::of(&seen, unattended));
+        self.ending = self.session.snapshot().map(|seen| self.ending(&seen));
         driven
+    }
+
+    fn ending(&self, seen: &Snapshot) -> Ending {
+        let now = Instant::now();
+        let useless = self.useless.lasted(now);
+        Ending {
+            state: seen.state,
+            attended: self.attended,
+            expired: self.expired,
+            held: self.held.lasted(now),
+            glove_answers: seen.glove_answers,
+            useless: useless.map(|()| shown::why_useless(seen)),
+            gripper_answers: seen.gripper_answers,
+            disobeyed: self.numbers.obeyed.fault(),
+        }
     }
 
     fn watch(&mut self, options: &Options) -> Result<End> {
@@ -353,6 +374,11 @@ impl Run {
         }
         self.look_at_clutch();
         self.look_at_file_limit();
+        if let Some(seen) = self.session.snapshot() {
+            let unusable = seen.frame_sequence > 0 && !seen.angles_valid;
+            self.useless.look(unusable.then_some(()), now);
+            self.held.look(seen.state.hold_reason(), now);
+        }
         self.take_records();
         Ok(())
     }

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 
 use bridge::State;
 use bridge::event::Kind;
-use glove::hand::LIMITS;
-use glove::scan::Health;
+use glove::hand::{LIMITS, SEGMENT_COUNT};
+use glove::scan::{Finding, Health};
 use gripper::{Activation, Contact, Status};
 
 use super::replies::Replies;
@@ -153,16 +153,37 @@ fn old(us: u64) -> Option<f32> {
     (us >= OLD_US).then_some(us as f32 / 1e6)
 }
 
+/// The sensors that are not used, by name, with what is wrong with them.
+fn unused_sensors(snapshot: &Snapshot) -> Vec<String> {
+    let mut unused = Vec::new();
+    if let Some(frame) = &snapshot.frame {
+        let health = frame.samples.map(|sample| sample.health);
+        unused.extend(words::lost_sensors(&health));
+    }
+    unused.extend(words::distrusted_sensors(snapshot.distrusted));
+    unused
+}
+
+/// Why the newest frames could not be used.
+pub(super) fn why_useless(snapshot: &Snapshot) -> String {
+    let unused = unused_sensors(snapshot);
+    if unused.is_empty() {
+        return "their joint angles are no numbers".to_owned();
+    }
+    unused.join("; ")
+}
+
 /// Whether the reason of a fault is gone.
 fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
     match kind {
         Kind::State { to, .. } => snapshot.state.name() != to.name(),
-        Kind::SensorLost { segment } => snapshot.frame.as_ref().is_some_and(|frame| {
-            frame
-                .samples
-                .get(*segment)
-                .is_some_and(|sample| sample.health == Health::Good)
-        }),
+        Kind::SensorLost { segment } => is_good(snapshot, *segment),
+        // As long as it is so, `standing` says it.
+        Kind::AxisStands { .. } => true,
+        Kind::SensorRestarted { segment } => snapshot.distrusted >> segment & 1 == 0,
+        Kind::Sensors(Finding::Jumped { segment, .. }) => snapshot.distrusted >> segment & 1 == 0,
+        Kind::Sensors(Finding::Frozen { segment }) => is_good(snapshot, (*segment).into()),
+        Kind::Sensors(Finding::AllFrozen) => (0..SEGMENT_COUNT).any(|k| is_good(snapshot, k)),
         Kind::Glove { .. } => snapshot.glove_answers,
         Kind::Gripper { .. } => snapshot.gripper_answers,
         Kind::GripperFault(_) => snapshot
@@ -170,6 +191,13 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
             .is_some_and(|status| status.fault == gripper::Fault::None),
         _ => false,
     }
+}
+
+fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
+    snapshot.frame.as_ref().is_some_and(|frame| {
+        let sample = frame.samples.get(segment);
+        sample.is_some_and(|sample| sample.health == Health::Good)
+    })
 }
 
 /// What is wrong now and stays so.
@@ -185,9 +213,10 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
         )),
         State::Idle | State::Blending | State::Following => {}
     }
-    if let Some(frame) = &snapshot.frame {
-        let health = frame.samples.map(|sample| sample.health);
-        faults.extend(words::lost_sensors(&health));
+    faults.extend(unused_sensors(snapshot));
+    if let Some(axis) = snapshot.stands {
+        let kind = Kind::AxisStands { axis };
+        faults.push(kind.to_string());
     }
     if let Some(status) = &snapshot.status {
         if status.fault != gripper::Fault::None {
@@ -210,10 +239,9 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
 
 /// The fingers of the hand.
 pub(super) fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
-    let good = match &snapshot.frame {
-        Some(frame) => frame.samples.map(|sample| sample.health == Health::Good),
-        None => [false; glove::hand::SEGMENT_COUNT],
-    };
+    let good: [bool; SEGMENT_COUNT] = core::array::from_fn(|segment| {
+        is_good(snapshot, segment) && snapshot.distrusted >> segment & 1 == 0
+    });
     let good = words::fingers_good(&good);
     words::FINGER_NAMES
         .iter()
