@@ -16,6 +16,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::event::Kind;
 use bridge::telemetry::Sent;
 use bridge::{HoldReason, State};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
@@ -404,11 +405,10 @@ impl Run {
             self.numbers.count(&record);
             match &record {
                 Record::Event {
-                    sort: Sort::Fault,
-                    text,
-                    kind,
-                    ..
-                } => self.shown.fault(text, *kind),
+                    sort, text, kind, ..
+                } if *sort == Sort::Fault || matches!(kind, Kind::Calibration(_)) => {
+                    self.shown.happened(text, *kind);
+                }
                 Record::Status(status) => self.shown.status(status, Instant::now()),
                 _ => {}
             }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use bridge::State;
+use bridge::calibration::Try;
 use bridge::event::Kind;
 use glove::hand::{LIMITS, SEGMENT_COUNT};
 use glove::scan::{Finding, Health};
@@ -39,8 +40,8 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// A fault happened. The same thing again only renews what is shown.
-    pub(super) fn fault(&mut self, text: &str, kind: Kind) {
+    /// A fault, or what became of a calibration. The same thing again only renews what is shown.
+    pub(super) fn happened(&mut self, text: &str, kind: Kind) {
         self.recent.retain(|(_, known, _)| known != text);
         self.recent
             .push_back((Instant::now(), text.to_owned(), kind));
@@ -184,6 +185,7 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
         Kind::Sensors(Finding::Jumped { segment, .. }) => snapshot.distrusted >> segment & 1 == 0,
         Kind::Sensors(Finding::Frozen { segment }) => is_good(snapshot, (*segment).into()),
         Kind::Sensors(Finding::AllFrozen) => (0..SEGMENT_COUNT).any(|k| is_good(snapshot, k)),
+        Kind::Calibration(end) => snapshot.calibration.newest != *end,
         Kind::Glove { .. } => snapshot.glove_answers,
         Kind::Gripper { .. } => snapshot.gripper_answers,
         Kind::GripperFault(_) => snapshot
@@ -212,6 +214,9 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
             snapshot.state
         )),
         State::Idle | State::Blending | State::Following => {}
+    }
+    if snapshot.calibration.newest == Try::Waiting {
+        faults.push(Kind::Calibration(Try::Waiting).to_string());
     }
     faults.extend(unused_sensors(snapshot));
     if let Some(axis) = snapshot.stands {
