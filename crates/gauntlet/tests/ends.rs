@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use rustix::process::{Pid, Signal, kill_process_group};
 use support::bench::{BRINGUP, Bench, Running, SOON, ends_soon, send};
 use support::terminal::Terminal;
-use support::{Simulation, command, interrupt};
+use support::{Simulation, command, interrupt, poses_file, poses_text, refusal};
 
 /// Whether this process, and with it what it starts, was told to ignore SIGHUP, which the tool then leaves so.
 fn hang_up_is_ignored() -> bool {
@@ -201,15 +201,74 @@ fn text_typed_by_mistake_closes_no_clutch_and_a_space_by_itself_does() {
     assert_eq!(ends_soon(&mut terminal.child), Some(0));
 }
 
-/// A stand-in for the emulator that tells how it ended; by itself after ten seconds.
+/// Started, and known by a word on its terminal.
+fn begun(arguments: &[&str], word: &str) -> Terminal {
+    let mut terminal = Terminal::start(arguments);
+    let end = Instant::now() + BRINGUP;
+    while !terminal.seen().contains(word) {
+        assert!(terminal.child.try_wait().unwrap().is_none(), "it ended");
+        assert!(Instant::now() < end, "{}", terminal.seen());
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    terminal
+}
+
+#[test]
+fn ctrl_c_ends_a_training_on_a_terminal_that_takes_no_output() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 300);
+    let model = folder.path().join("model.safetensors");
+    let mut terminal = begun(
+        &[
+            "train",
+            "--poses",
+            poses.to_str().unwrap(),
+            "--out",
+            model.to_str().unwrap(),
+        ],
+        "left",
+    );
+    terminal.fill();
+    std::thread::sleep(Duration::from_secs(1));
+    interrupt(&terminal.child);
+    ends_soon(&mut terminal.child);
+}
+
+#[test]
+fn ctrl_c_ends_the_reading_of_a_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = folder.path().join("poses.csv");
+    let made = std::process::Command::new("mkfifo").arg(&poses).status();
+    assert!(made.unwrap().success());
+    let model = folder.path().join("model.safetensors");
+    let words = [
+        "train",
+        "--poses",
+        poses.to_str().unwrap(),
+        "--out",
+        model.to_str().unwrap(),
+    ];
+    let mut running = Running::start(command(&words).stdout(Stdio::null()).stderr(Stdio::piped()));
+    // Whoever writes it never comes to its end.
+    let mut writer = std::fs::File::options().write(true).open(&poses).unwrap();
+    writer.write_all(poses_text(50).as_bytes()).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    interrupt(&running.0);
+    assert_eq!(ends_soon(&mut running.0), Some(1));
+    let error = refusal(&running.finish(), 1);
+    assert!(error.contains("was read"), "{error}");
+    assert!(!model.exists());
+}
+
+/// A stand-in for the emulator that tells how it ended; by itself after a minute.
 const EMULATOR: &str = "#!/bin/bash
 trap 'echo interrupted > \"$SAYS\"; exit' INT TERM
 echo started > \"$SAYS\"
-for _ in {1..200}; do sleep 0.05; done
+for _ in {1..1200}; do sleep 0.05; done
 ";
 
 #[test]
-fn ctrl_c_at_the_terminal_does_not_reach_the_emulator() {
+fn ctrl_c_at_the_terminal_does_not_reach_the_emulator_and_ends_the_wait_for_it() {
     let folder = tempfile::tempdir().unwrap();
     let (program, says) = (
         folder.path().join("qemu-system-arm"),
@@ -237,8 +296,6 @@ fn ctrl_c_at_the_terminal_does_not_reach_the_emulator() {
     }
     let group = Pid::from_raw(i32::try_from(child.id()).unwrap()).unwrap();
     kill_process_group(group, Signal::INT).unwrap();
-    std::thread::sleep(Duration::from_millis(500));
+    ends_soon(child);
     assert_eq!(said(), "started\n");
-    child.kill().unwrap();
-    child.wait().unwrap();
 }
