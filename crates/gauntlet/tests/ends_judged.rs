@@ -6,9 +6,7 @@ mod support;
 use std::process::{Command, Stdio};
 use std::time::Duration;
 
-use rig::gripper::VirtualGripper;
-use support::bench::{Bench, Running};
-use support::lines::{Shaped, at_once};
+use support::bench::{Bench, Running, standing};
 use support::{command, refusal, run, text};
 
 #[test]
@@ -127,22 +125,6 @@ fn a_run_whose_glove_came_back_has_not_failed() {
         bench.glove.freeze(3, false);
     });
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-}
-
-/// A gripper that takes every command and says that its fingers are where they were, moving or at their position.
-fn standing(gripper: VirtualGripper, contact: u8) -> Box<dyn rig::Device> {
-    Box::new(Shaped::new(gripper, move |mut frame| {
-        if frame.len() >= 21 && matches!(frame[1], 3 | 4 | 23) && frame[2] == 16 {
-            frame[3 + 1] = contact;
-            for axis in 0..4 {
-                frame[3 + 4 + 3 * axis] = 30;
-            }
-            let body = frame.len() - 2;
-            let crc = gripper::rtu::crc16(&frame[..body]).to_le_bytes();
-            frame[body..].copy_from_slice(&crc);
-        }
-        at_once(frame)
-    }))
 }
 
 #[test]

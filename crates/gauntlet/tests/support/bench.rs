@@ -13,6 +13,7 @@ use rig::gripper::{Config, VirtualGripper};
 use rig::pty::{Handle, PtyDevice};
 use rustix::process::{Pid, Signal, kill_process};
 
+use super::lines::{Shaped, at_once};
 use super::{devices, model, wait};
 
 /// An orderly end: 1.5 s for the hold, 2 s for what is printed, and a busy machine.
@@ -33,7 +34,7 @@ pub struct Bench {
 }
 
 /// Flat, then all fingers bend and stretch every 4 s.
-fn hand(moves: Arc<AtomicBool>) -> impl Fn(f64) -> [f32; 25] {
+pub fn hand(moves: Arc<AtomicBool>) -> impl Fn(f64) -> [f32; 25] {
     let since = Mutex::new(None);
     move |time| {
         let mut angles = [0.0; 25];
@@ -214,4 +215,20 @@ pub fn ends_soon(child: &mut Child) -> Option<i32> {
 pub fn send(child: &Child, signal: Signal) {
     let id = Pid::from_raw(i32::try_from(child.id()).unwrap()).unwrap();
     kill_process(id, signal).unwrap();
+}
+
+/// A gripper that takes every command and says that its fingers are where they were, moving or at their position.
+pub fn standing(gripper: VirtualGripper, contact: u8) -> Box<dyn Device> {
+    Box::new(Shaped::new(gripper, move |mut frame| {
+        if frame.len() >= 21 && matches!(frame[1], 3 | 4 | 23) && frame[2] == 16 {
+            frame[3 + 1] = contact;
+            for axis in 0..4 {
+                frame[3 + 4 + 3 * axis] = 30;
+            }
+            let body = frame.len() - 2;
+            let crc = gripper::rtu::crc16(&frame[..body]).to_le_bytes();
+            frame[body..].copy_from_slice(&crc);
+        }
+        at_once(frame)
+    }))
 }
