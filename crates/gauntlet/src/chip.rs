@@ -175,15 +175,17 @@ impl<'a> Watch<'a> {
 
     fn ending(&mut self, before: &Counters) -> Option<Ending> {
         let status = self.status.clone()?;
+        // Who only watches is not to blame for what another host's run came to.
+        let ours = self.engaged;
         Some(Ending {
             state: status.state,
             attended: self.attended,
             expired: self.expired,
-            held: self.held.lasted(Instant::now()),
+            held: self.held.lasted(Instant::now()).filter(|_| ours),
             glove_answers: status.glove_answers,
             useless: self.useless(before, &status),
             gripper_answers: status.gripper.is_some(),
-            disobeyed: self.obeyed.fault(),
+            disobeyed: self.obeyed.fault().filter(|_| ours),
         })
     }
 

@@ -16,6 +16,8 @@ use crate::{note, out};
 const LINE_EVERY: Duration = Duration::from_secs(5);
 /// What is left stands first and is never cut off; a narrow terminal cuts the details at the end.
 const TEMPLATE: &str = "{percent:>3} % {prefix} {bar:16} {wide_msg}";
+/// For what is printed beside the bar to be taken.
+const SETTLE: Duration = Duration::from_millis(50);
 /// Redraws a second.
 const REDRAWS: u8 = 10;
 
@@ -93,7 +95,11 @@ impl Progress {
     /// Prints with the bar out of the way.
     pub fn aside(&self, print: impl FnOnce()) {
         match &self.shown {
-            Display::Bar(bar) => bar.suspend(print),
+            Display::Bar(bar) => bar.suspend(|| {
+                print();
+                // Else the bar might be drawn before it.
+                out::settle(SETTLE);
+            }),
             Display::Lines { .. } | Display::Quiet => print(),
         }
     }
