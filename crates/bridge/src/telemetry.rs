@@ -32,6 +32,9 @@ pub struct Telemetry<const X: usize> {
     pub angles_valid: bool,
     /// Segments without a usable sample in the newest frame (bit k: segment k).
     pub missing: u16,
+    /// Segments whose samples look good and are not used until the next calibration: they jumped or restarted (bit k: segment
+    /// k).
+    pub distrusted: u16,
     /// Joints that repeat their last good angle (bit j: joint j).
     pub held_joints: u32,
     /// The map's output for `angles`, counts as they come from the map; `None` without map or when it refused.
@@ -48,6 +51,8 @@ pub struct Telemetry<const X: usize> {
     pub status_sequence: u32,
     /// The newest status.
     pub status: Option<Status<X>>,
+    /// This axis stands although it is told to move, and says nothing of an obstacle.
+    pub stands: Option<u8>,
     /// Of the newest command that left and followed the hand: from the stamp of the oldest sample used to its leaving.
     pub latency: Option<Duration>,
     /// Whether frames come from the glove (at least one in 500 ms).
@@ -119,6 +124,7 @@ impl<const X: usize> Telemetry<X> {
             angles: [0.0; JOINT_COUNT],
             angles_valid: false,
             missing: 0,
+            distrusted: 0,
             held_joints: 0,
             map_output: None,
             target: None,
@@ -127,6 +133,7 @@ impl<const X: usize> Telemetry<X> {
             sent: None,
             status_sequence: 0,
             status: None,
+            stands: None,
             latency: None,
             glove_answers: false,
             gripper_answers: false,

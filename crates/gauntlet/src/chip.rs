@@ -3,27 +3,28 @@
 mod stop;
 mod summary;
 mod table;
+mod view;
 
 use stop::stop;
 pub use summary::Summary;
 pub use table::{write_head, write_row};
+pub use view::standing_faults;
 
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::clutch::HeartbeatRefusal;
 use bridge::protocol::message::{Counters, Sample, Status};
-use bridge::{Epoch, State};
-use gripper::{Activation, Fault};
+use bridge::{Epoch, HoldReason};
 
 use crate::failure::{Failure, OrFail};
 use crate::host_link::{Error, Heartbeat, HostLink};
 use crate::interrupt::Interrupt;
-use crate::live::{Axis, Finger, Key, Live, View};
-use crate::run::{End, Ending, first_failure};
+use crate::live::{Key, Live};
+use crate::out;
+use crate::run::{End, Ending, Lasting, MOVED_COUNTS, Obeyed, first_failure};
 use crate::stats::{Percentiles, Rate};
 use crate::stopped::Stopped;
-use crate::{out, words};
 
 /// Pause between two heartbeats, spent listening.
 const HEARTBEAT: Duration = Duration::from_millis(100);
@@ -35,8 +36,9 @@ const COUNT_EVERY: Duration = Duration::from_secs(1);
 pub const SAMPLE_MS: u16 = 50;
 /// Heartbeats without an answer, in a row, after which nobody is there: 2 s.
 const MISSED_BEATS: u32 = 20;
-/// Counts of position that are a motion.
-const MOVED_COUNTS: u8 = 4;
+
+/// Frames of a watch that say something of the glove.
+const LEAST_FRAMES: u32 = 10;
 
 /// How a watch goes.
 #[derive(Debug)]
@@ -107,6 +109,10 @@ pub struct Watch<'a> {
     started: Instant,
     start_positions: Option<Vec<u8>>,
     first_motion: Option<Duration>,
+    /// Whether the gripper went where it was told.
+    obeyed: Obeyed,
+    /// What holds it.
+    held: Lasting<HoldReason>,
     counted: Option<(Instant, Counters)>,
     cycles_per_s: f64,
 }
@@ -131,6 +137,8 @@ impl<'a> Watch<'a> {
             started: Instant::now(),
             start_positions: None,
             first_motion: None,
+            obeyed: Obeyed::default(),
+            held: Lasting::default(),
             counted: None,
             cycles_per_s: 0.0,
         }
@@ -150,7 +158,7 @@ impl<'a> Watch<'a> {
         self.link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
         self.started = Instant::now();
         let end = self.watch(options, each);
-        let ending = self.ending();
+        let ending = self.ending(&before);
         let seconds = self.started.elapsed().as_secs_f64();
         let stopped = self.engaged.then(|| stop(self.link));
         let known = self.counted.map_or(before, |(_, counters)| counters);
@@ -165,14 +173,31 @@ impl<'a> Watch<'a> {
         })
     }
 
-    fn ending(&self) -> Option<Ending> {
-        let status = self.status.as_ref()?;
-        Some(Ending::new(
-            status.state,
-            status.glove_answers,
-            status.gripper.is_some(),
-            self.expired && !self.attended,
-        ))
+    fn ending(&mut self, before: &Counters) -> Option<Ending> {
+        let status = self.status.clone()?;
+        // Who only watches is not to blame for what another host's run came to.
+        let ours = self.engaged;
+        Some(Ending {
+            state: status.state,
+            attended: self.attended,
+            expired: self.expired,
+            held: self.held.lasted(Instant::now()).filter(|_| ours),
+            glove_answers: status.glove_answers,
+            useless: self.useless(before, &status),
+            gripper_answers: status.gripper.is_some(),
+            disobeyed: self.obeyed.fault().filter(|_| ours),
+        })
+    }
+
+    /// Why no frame of the whole watch could be used. What else makes frames useless (no weights, no calibration) is told as
+    /// what it is.
+    fn useless(&mut self, before: &Counters, status: &Status) -> Option<String> {
+        let (_, counted) = self.counted?;
+        let grown = counted.since(before);
+        let all = grown.frames >= LEAST_FRAMES && grown.unusable_frames >= grown.frames;
+        let ready = all && status.active_slot.is_some();
+        let calibrated = ready && self.link.health().ok()?.calibration.is_calibrated;
+        calibrated.then(|| "sensors are lost, frozen or give what is no orientation".to_owned())
     }
 
     fn watch(
@@ -203,6 +228,8 @@ impl<'a> Watch<'a> {
                 asked_status = Some(beat);
                 self.status = Some(self.link.status().map_err(Failure::from)?);
             }
+            let reason = self.status.as_ref().and_then(|s| s.state.hold_reason());
+            self.held.look(reason, beat);
             self.count(beat + HEARTBEAT)?;
             let rest = HEARTBEAT.saturating_sub(beat.elapsed());
             for sample in self.link.listen(rest).map_err(Failure::from)? {
@@ -309,6 +336,9 @@ impl<'a> Watch<'a> {
         }
         self.samples += 1;
         if sample.state.is_moving() {
+            // What is in an axis' way is not told on this wire.
+            self.obeyed
+                .look(now_us, &sample.command, &sample.position, |_| false);
             if let Some(us) = sample.latency_us {
                 self.latency.add(us.into());
             }
@@ -352,109 +382,4 @@ impl<'a> Watch<'a> {
             first_motion_s: self.first_motion.map(|after| after.as_secs_f64()),
         }
     }
-
-    fn view(&mut self, options: &Options) -> View {
-        let now_us = self.sample.as_ref().map_or(0, |sample| sample.now_us);
-        let state = self
-            .sample
-            .as_ref()
-            .map(|sample| sample.state)
-            .or(self.status.as_ref().map(|status| status.state));
-        View {
-            title: options.title.to_owned(),
-            elapsed: self.started.elapsed(),
-            total: options.seconds,
-            state: state.as_ref().map_or("starting", State::name).to_owned(),
-            following: state.is_some_and(|state| state.is_moving()),
-            fingers: self.sample.as_ref().map(fingers).unwrap_or_default(),
-            hand_age: None,
-            axes: self.sample.as_ref().map(axes).unwrap_or_default(),
-            gripper_age: None,
-            frames_per_s: self.frames.now(now_us),
-            cycles_per_s: self.cycles_per_s,
-            latency_p50: self.latency.at(0.5),
-            latency_p99: self.latency.at(0.99),
-            dropped: 0,
-            faults: self.faults(state),
-            fault_count: self
-                .counted
-                .map_or(0, |(_, counters)| counters.faults.into()),
-            keys: if options.engage {
-                "space: close or open the clutch   q: open it and end"
-            } else {
-                "q: end"
-            },
-        }
-    }
-
-    fn faults(&self, state: Option<State>) -> Vec<String> {
-        let mut faults: Vec<String> = match state {
-            Some(state @ (State::Holding(_) | State::SafeAction(_) | State::Faulted(_))) => {
-                vec![state.to_string()]
-            }
-            _ => Vec::new(),
-        };
-        if self.expired {
-            faults.push("the clutch opened by itself: space closes it again".to_owned());
-        }
-        if let Some(status) = &self.status {
-            faults.extend(standing_faults(status));
-        }
-        faults
-    }
-}
-
-/// What is wrong with the bridge's devices now.
-pub fn standing_faults(status: &Status) -> Vec<String> {
-    let mut faults = Vec::new();
-    if !status.glove_answers {
-        faults.push("the glove sends no frames".to_owned());
-    }
-    match &status.gripper {
-        None => faults.push("the gripper does not answer".to_owned()),
-        Some(gripper) => {
-            if gripper.activation != Activation::Ready {
-                faults.push(format!(
-                    "the gripper is {}",
-                    words::activation(gripper.activation)
-                ));
-            }
-            if gripper.fault != Fault::None {
-                faults.push(format!(
-                    "gripper fault {:02X}: {}; {}",
-                    gripper.fault.code(),
-                    gripper.fault.sentence(),
-                    gripper.fault.action()
-                ));
-            }
-        }
-    }
-    faults
-}
-
-fn fingers(sample: &Sample) -> Vec<Finger> {
-    let limits = &glove::hand::LIMITS;
-    words::FINGER_NAMES
-        .iter()
-        .enumerate()
-        .map(|(finger, name)| Finger {
-            name,
-            angles: core::array::from_fn(|joint| sample.angles[5 * finger + joint]),
-            limits: core::array::from_fn(|joint| limits[5 * finger + joint]),
-            good: true,
-        })
-        .collect()
-}
-
-fn axes(sample: &Sample) -> Vec<Axis> {
-    words::AXIS_WORDS
-        .iter()
-        .enumerate()
-        .map(|(axis, name)| Axis {
-            name,
-            asked: sample.command.get(axis).copied(),
-            reached: sample.position.get(axis).copied(),
-            word: "",
-        })
-        .collect()
 }

@@ -14,7 +14,7 @@ mod serial;
 
 use serde::Serialize;
 
-pub use glove::{glove, keeps_registers, no_glove};
+pub use glove::{glove, keeps_registers, missing_sensors, no_glove, no_sensors};
 pub use gripper::{gripper, no_gripper};
 pub use place::{Asked, Place};
 

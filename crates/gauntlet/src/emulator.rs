@@ -16,6 +16,7 @@ use tempfile::TempDir;
 
 use crate::failure::{Failure, OrFail};
 use crate::host_link::{Address, HostLink};
+use crate::interrupt::Interrupt;
 use crate::realtime;
 
 /// The program that emulates.
@@ -165,6 +166,18 @@ impl Emulator {
     /// # Errors
     /// As [`Emulator::power_on`], or a firmware that stays silent.
     pub fn link(&mut self) -> Result<HostLink> {
+        let nobody = Interrupt::never().or_fail(
+            || "nothing can be waited for".to_owned(),
+            "ending other programs: the system lacks descriptors",
+        )?;
+        self.link_unless(&nobody)
+    }
+
+    /// The same, given up when somebody asks for the end.
+    ///
+    /// # Errors
+    /// As [`Emulator::link`], or that it was given up.
+    pub fn link_unless(&mut self, interrupt: &Interrupt) -> Result<HostLink> {
         if self.child.is_none() {
             self.power_on()?;
         }
@@ -183,7 +196,9 @@ impl Emulator {
             match HostLink::connect(&self.address()) {
                 Ok(link) => return Ok(link),
                 Err(error) if error.is_of_the_line() && Instant::now() < end => {
-                    std::thread::sleep(PAUSE);
+                    if interrupt.sleep(PAUSE) {
+                        return Err(Failure::interrupted("while the emulator started").into());
+                    }
                 }
                 Err(error) => return Err(Failure::from(error).into()),
             }

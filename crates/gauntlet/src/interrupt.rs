@@ -2,7 +2,11 @@
 //!
 //! A signal only asks for an orderly end: gripper held, log finished, terminal restored. Every part of that end has a
 //! deadline, so that no second, impatient way out is needed. Every signal that can be caught and would end the program
-//! is one of them; none may end it in motion, without a hold.
+//! is one of them; none may end it in motion, without a hold. What the processor raises for a fault of this program itself
+//! ends it at once (`interrupt::faults`).
+
+#[cfg(target_os = "linux")]
+mod faults;
 
 use std::ffi::c_int;
 use std::ops::RangeInclusive;
@@ -82,6 +86,8 @@ impl Interrupt {
         }
         flag::register(SIGXFSZ, Arc::clone(&interrupt.flags.file_limit))?;
         let _ = INSTALLED.set(interrupt.clone());
+        #[cfg(target_os = "linux")]
+        faults::install()?;
         Ok(interrupt)
     }
 

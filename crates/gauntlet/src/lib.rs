@@ -12,7 +12,7 @@
 //! | [`run`], [`live`], [`stats`], [`words`] | a run as a person sees it |
 //! | [`record`], [`session_log`] | what a run hands over, and its log |
 //! | [`host_link`], [`chip`], [`emulator`] | a bridge on a chip: the host protocol, watching it, the firmware in QEMU |
-//! | [`poses`], [`training`], [`quality`], [`model`] | hand motion, the map and its measures |
+//! | [`reading`], [`poses`], [`training`], [`quality`], [`model`] | hand motion, the map and its measures |
 
 pub mod chip;
 pub mod cli;
@@ -34,6 +34,7 @@ pub mod poses;
 pub mod probe;
 pub mod progress;
 pub mod quality;
+pub mod reading;
 pub mod realtime;
 pub mod record;
 pub mod run;

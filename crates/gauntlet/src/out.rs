@@ -116,6 +116,11 @@ pub fn ask(text: Arguments<'_>) {
     STDERR.push(text.to_string().as_bytes());
 }
 
+/// A picture of how something goes to standard error: dropped where the one before was not taken, and never waited for.
+pub fn sketch(bytes: &[u8]) {
+    STDERR.offer(bytes);
+}
+
 /// Standard output as a writer of whole pictures: what is written leaves with the next flush.
 #[derive(Debug, Default)]
 pub struct Screen(Vec<u8>);

@@ -5,6 +5,7 @@ use std::time::Instant;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use super::*;
+use crate::failure::Failure;
 
 /// A master side and the path of its slave.
 fn pair() -> (OwnedFd, PathBuf) {

@@ -1,18 +1,23 @@
 //! A progress bar with an estimate on a terminal, a plain line now and then elsewhere. Always on standard error, so
 //! that results on standard output stay clean.
 
+use std::fmt::Write;
 use std::io::IsTerminal;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
+use rustix::termios::tcgetwinsize;
 
-use crate::note;
 use crate::stats::seconds;
+use crate::{note, out};
 
 /// Pause between two plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(5);
 /// What is left stands first and is never cut off; a narrow terminal cuts the details at the end.
 const TEMPLATE: &str = "{percent:>3} % {prefix} {bar:16} {wide_msg}";
+/// For what is printed beside the bar to be taken.
+const SETTLE: Duration = Duration::from_millis(50);
 /// Redraws a second.
 const REDRAWS: u8 = 10;
 
@@ -90,7 +95,11 @@ impl Progress {
     /// Prints with the bar out of the way.
     pub fn aside(&self, print: impl FnOnce()) {
         match &self.shown {
-            Display::Bar(bar) => bar.suspend(print),
+            Display::Bar(bar) => bar.suspend(|| {
+                print();
+                // Else the bar might be drawn before it.
+                out::settle(SETTLE);
+            }),
             Display::Lines { .. } | Display::Quiet => print(),
         }
     }
@@ -113,13 +122,81 @@ impl Drop for Progress {
 }
 
 fn bar(what: &'static str, total: u64) -> ProgressBar {
-    let bar =
-        ProgressBar::with_draw_target(Some(total), ProgressDrawTarget::stderr_with_hz(REDRAWS));
+    let target = ProgressDrawTarget::term_like_with_hz(Box::<Terminal>::default(), REDRAWS);
+    let bar = ProgressBar::with_draw_target(Some(total), target);
     if let Ok(style) = ProgressStyle::with_template(TEMPLATE) {
         bar.set_style(style.progress_chars("━╸─"));
     }
     bar.set_prefix(what);
     bar
+}
+
+/// The terminal at standard error, drawn on through the queue of `out`.
+#[derive(Debug, Default)]
+struct Terminal {
+    drawn: Mutex<String>,
+}
+
+/// Columns where the terminal does not say.
+const COLUMNS: u16 = 80;
+
+impl Terminal {
+    fn draw(&self) -> MutexGuard<'_, String> {
+        self.drawn.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// A control sequence with a number; nothing for none.
+    fn control(&self, count: usize, what: char) -> std::io::Result<()> {
+        if count > 0 {
+            // A string takes everything.
+            let _ = write!(self.draw(), "\x1b[{count}{what}");
+        }
+        Ok(())
+    }
+}
+
+impl TermLike for Terminal {
+    fn width(&self) -> u16 {
+        let told = tcgetwinsize(std::io::stderr()).map_or(0, |size| size.ws_col);
+        if told > 0 { told } else { COLUMNS }
+    }
+
+    fn move_cursor_up(&self, count: usize) -> std::io::Result<()> {
+        self.control(count, 'A')
+    }
+
+    fn move_cursor_down(&self, count: usize) -> std::io::Result<()> {
+        self.control(count, 'B')
+    }
+
+    fn move_cursor_right(&self, count: usize) -> std::io::Result<()> {
+        self.control(count, 'C')
+    }
+
+    fn move_cursor_left(&self, count: usize) -> std::io::Result<()> {
+        self.control(count, 'D')
+    }
+
+    fn write_line(&self, text: &str) -> std::io::Result<()> {
+        let mut drawn = self.draw();
+        drawn.push_str(text);
+        drawn.push('\n');
+        Ok(())
+    }
+
+    fn write_str(&self, text: &str) -> std::io::Result<()> {
+        self.draw().push_str(text);
+        Ok(())
+    }
+
+    fn clear_line(&self) -> std::io::Result<()> {
+        self.write_str("\r\x1b[2K")
+    }
+
+    fn flush(&self) -> std::io::Result<()> {
+        out::sketch(std::mem::take(&mut *self.draw()).as_bytes());
+        Ok(())
+    }
 }
 
 fn remaining(elapsed: Duration, done: u64, total: u64) -> Option<Duration> {

@@ -3,7 +3,9 @@
 pub mod calibrating;
 mod clutch;
 mod ending;
+mod lasting;
 mod numbers;
+mod obeyed;
 mod replies;
 mod shown;
 mod summary;
@@ -14,20 +16,25 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use bridge::event::Kind;
+use bridge::telemetry::Sent;
+use bridge::{HoldReason, State};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::failure::OrFail;
 use crate::interrupt::Interrupt;
 use crate::live::{Key, Live};
 use crate::platform::Clock;
-use crate::record::{Record, Sort};
+use crate::record::{AXES, Record, Sort};
 use crate::session::{Order, Session, Snapshot};
 use crate::session_log::SessionLog;
 use crate::{note, out};
 use shown::Shown;
 
 pub use ending::{Ending, Finished, first_failure};
+pub use lasting::Lasting;
 pub use numbers::Numbers;
+pub use obeyed::{MOVED_COUNTS, Obeyed};
 pub use replies::Failed;
 pub use summary::Summary;
 
@@ -88,6 +95,10 @@ pub struct Run {
     attended: bool,
     heartbeat: Option<Instant>,
     shown: Shown,
+    /// What holds the gripper.
+    held: Lasting<HoldReason>,
+    /// No frame of the glove can be used.
+    useless: Lasting<()>,
     /// The view was not taken for so long that nobody sees it.
     unseen: bool,
     /// When a file grew to its limit.
@@ -120,6 +131,8 @@ impl Run {
             attended: false,
             heartbeat: None,
             shown: Shown::default(),
+            held: Lasting::default(),
+            useless: Lasting::default(),
             unseen: false,
             file_limit: None,
             ending: None,
@@ -199,12 +212,23 @@ impl Run {
     pub fn drive(&mut self, options: &Options) -> Result<End> {
         self.start_log()?;
         let driven = self.watch(options);
-        let unattended = self.expired && !self.attended;
-        self.ending = self
-            .session
-            .snapshot()
-            .map(|seen| Ending::of(&seen, unattended));
+        self.ending = self.session.snapshot().map(|seen| self.ending(&seen));
         driven
+    }
+
+    fn ending(&self, seen: &Snapshot) -> Ending {
+        let now = Instant::now();
+        let useless = self.useless.lasted(now);
+        Ending {
+            state: seen.state,
+            attended: self.attended,
+            expired: self.expired,
+            held: self.held.lasted(now),
+            glove_answers: seen.glove_answers,
+            useless: useless.map(|()| shown::why_useless(seen)),
+            gripper_answers: seen.gripper_answers,
+            disobeyed: self.numbers.obeyed.fault(),
+        }
     }
 
     fn watch(&mut self, options: &Options) -> Result<End> {
@@ -257,13 +281,15 @@ impl Run {
 
     /// Opens the clutch, and waits until the hold has left.
     fn hold_for_a_while(&mut self) -> Result<()> {
+        let released = self.clock.now();
         self.release();
         let end = Instant::now() + SUSPEND_HOLD;
         let mut held = false;
         while !held && Instant::now() < end && !self.interrupt.sleep(ROUND) {
             self.round()?;
             held = self.session.snapshot().is_some_and(|seen| {
-                !seen.state.is_moving() && seen.sent.is_none_or(|sent| !sent.follows)
+                let holds = |sent: Sent<AXES>| !sent.follows && sent.decided > released;
+                seen.state == State::Idle && seen.sent.is_none_or(holds)
             });
         }
         Ok(())
@@ -349,6 +375,11 @@ impl Run {
         }
         self.look_at_clutch();
         self.look_at_file_limit();
+        if let Some(seen) = self.session.snapshot() {
+            let unusable = seen.frame_sequence > 0 && !seen.angles_valid;
+            self.useless.look(unusable.then_some(()), now);
+            self.held.look(seen.state.hold_reason(), now);
+        }
         self.take_records();
         Ok(())
     }
@@ -374,11 +405,10 @@ impl Run {
             self.numbers.count(&record);
             match &record {
                 Record::Event {
-                    sort: Sort::Fault,
-                    text,
-                    kind,
-                    ..
-                } => self.shown.fault(text, *kind),
+                    sort, text, kind, ..
+                } if *sort == Sort::Fault || matches!(kind, Kind::Calibration(_)) => {
+                    self.shown.happened(text, *kind);
+                }
                 Record::Status(status) => self.shown.status(status, Instant::now()),
                 _ => {}
             }

@@ -83,6 +83,22 @@ pub fn lost_sensors(health: &[Health; hand::SEGMENT_COUNT]) -> Option<String> {
     }
 }
 
+/// The sensors that are not used although they give orientations, by name. `distrusted`: bit k is segment k.
+pub fn distrusted_sensors(distrusted: u16) -> Option<String> {
+    let names: Vec<&str> = hand::SEGMENT_NAMES
+        .iter()
+        .enumerate()
+        .filter(|(segment, _)| distrusted >> segment & 1 == 1)
+        .map(|(_, name)| *name)
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "sensor {} jumped or restarted: its joints are held until the next calibration",
+            names.join(", ")
+        )
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -68,8 +68,6 @@ where
     gripper_error: Option<R::Error>,
     sensors: Sensors,
     calibrating: Calibrating,
-    /// The axis that stood still in the newest step.
-    stands: Option<u8>,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
     telemetry: Telemetry<X>,
@@ -129,7 +127,6 @@ where
             gripper_error: None,
             sensors: Sensors::default(),
             calibrating: Calibrating::default(),
-            stands: None,
             weights: None,
             frame_at: None,
             events,

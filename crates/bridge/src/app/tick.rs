@@ -205,6 +205,7 @@ where
         self.telemetry.command = output.motion;
         self.telemetry.target = output.target;
         self.telemetry.glove_state = self.scanner.state();
+        self.telemetry.distrusted = self.posture.distrusted();
         let counters = &mut self.telemetry.counters;
         counters.glove = *self.scanner.counters();
         counters.gripper = self.gripper.counters();
@@ -239,10 +240,13 @@ where
                 },
             );
         }
-        if let Some(axis) = output.stands.filter(|_| self.stands != output.stands) {
+        if let Some(axis) = output
+            .stands
+            .filter(|_| self.telemetry.stands != output.stands)
+        {
             self.tell(now, Kind::AxisStands { axis });
         }
-        self.stands = output.stands;
+        self.telemetry.stands = output.stands;
         if let Some(by) = output.late {
             self.tell(now, Kind::Late { by });
         }

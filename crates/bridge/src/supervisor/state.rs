@@ -92,6 +92,14 @@ impl State {
         }
     }
 
+    /// Why motion is held, where it is.
+    pub fn hold_reason(&self) -> Option<HoldReason> {
+        match self {
+            State::Holding(reason) | State::SafeAction(reason) => Some(*reason),
+            State::Idle | State::Blending | State::Following | State::Faulted(_) => None,
+        }
+    }
+
     /// Whether commands follow the hand.
     pub fn is_moving(&self) -> bool {
         matches!(self, State::Blending | State::Following)

@@ -23,7 +23,7 @@ use crate::session::{Parts, Session};
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Outcome, Request, train};
-use crate::{model, out, outputs, probe, realtime};
+use crate::{model, out, outputs, probe, reading, realtime};
 
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
@@ -40,7 +40,9 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     }
     let clock = Clock::start();
     let tell = Tell::new(options.json);
-    let motion = Motion::open_for_training(options.poses.as_deref(), options.seed)?;
+    let motion = reading::ended_by(interrupt, "the recording", || {
+        Motion::open_for_training(options.poses.as_deref(), options.seed)
+    })?;
     if let Some(path) = &options.log {
         outputs::check_new(path)?;
     }

@@ -9,9 +9,9 @@ use crate::failure::Failure;
 use crate::host_link::{Flashed, HostLink};
 use crate::interrupt::Interrupt;
 use crate::model::{self, Int16};
-use crate::out;
 use crate::progress::Progress;
 use crate::tell::Tell;
+use crate::{out, reading};
 
 /// Writes the file's weights into the bridge.
 ///
@@ -19,7 +19,9 @@ use crate::tell::Tell;
 /// A failure that names the file, the line, or what the bridge refuses.
 pub(super) fn run(options: &Flash, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
-    let weights = model::weights(&options.file, options.int16.as_deref())?;
+    let weights = reading::ended_by(interrupt, "what is to be written", || {
+        model::weights(&options.file, options.int16.as_deref())
+    })?;
     if let Some(int16) = &weights.int16 {
         tell.say(format_args!("int16      {}", int16.line()));
     }

@@ -17,7 +17,7 @@ use crate::poses::Motion;
 use crate::run::End;
 use crate::stats::seconds;
 use crate::tell::Tell;
-use crate::{model, out};
+use crate::{model, out, reading};
 
 /// The virtual sensors boot in 650 ms and are brought up within a few seconds.
 const FRAME_WAIT: Duration = Duration::from_secs(20);
@@ -29,7 +29,9 @@ const PAUSE: Duration = Duration::from_millis(100);
 /// A failure that says which of its steps did not succeed.
 pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
-    let motion = Motion::open_for_training(options.poses.as_deref(), options.seed)?;
+    let motion = reading::ended_by(interrupt, "the recording", || {
+        Motion::open_for_training(options.poses.as_deref(), options.seed)
+    })?;
     // What is missing is said before the training, not after it.
     let firmware = find_firmware(options.firmware.as_deref())?;
     tell.say(format_args!(
@@ -45,7 +47,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     })?;
     let outcome = demo::trained(options, &motion, &tell, interrupt)?;
     let image = model::image(&outcome.model)?;
-    let mut link = emulator.link()?;
+    let mut link = emulator.link_unless(interrupt)?;
     tell_parts(&devices, &emulator, &tell);
     let flashed = flash::flash(&mut link, &image, &tell, interrupt)?;
     let driven = drive(options, &mut link, &tell, interrupt)?;

@@ -4,6 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
+use glove::hand::SEGMENT_COUNT;
+use glove::scan::Health;
 use gripper::{Activation, Status};
 use serde_json::json;
 
@@ -14,12 +16,14 @@ use crate::platform::Clock;
 use crate::port::BAUD;
 use crate::record::AXES;
 use crate::run::{Options, Run};
-use crate::session::{Order, Parts, Session};
+use crate::session::{Order, Parts, Session, Snapshot};
 use crate::tell::Tell;
-use crate::{model, out, outputs, ports, probe, words};
+use crate::{diagnose, model, out, outputs, ports, probe, words};
 
 /// Bring-up of 16 sensors: a reset of 650 ms, two mode changes each, and time to spare.
 const FRAME_WAIT: Duration = Duration::from_secs(15);
+/// For the others after the first that gives orientations.
+const STRAGGLERS: Duration = Duration::from_secs(2);
 /// An activation takes a few seconds; a gripper that needs longer has a fault.
 pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
 
@@ -72,13 +76,19 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     };
     let session = Session::start(parts, clock, interrupt)?;
     let mut run = Run::new(session, options.log.clone(), clock, interrupt.clone());
-    let driven = prepare(options, &mut run, &tell, interrupt, status).and_then(|go_on| {
-        if go_on {
-            drive(options, &mut run)?;
-        }
-        Ok(())
-    });
+    let prepared = prepare(options, &mut run, &tell, interrupt, status);
+    let frames = !matches!(prepared, Ok(Prepared::NoFrames));
+    let driven = match prepared {
+        Ok(Prepared::Ready) => drive(options, &mut run),
+        Ok(Prepared::Ended | Prepared::NoFrames) => Ok(()),
+        Err(error) => Err(error),
+    };
     let finished = run.finish();
+    let driven = match frames {
+        true => driven,
+        // The port is free now.
+        false => Err(no_frames(&options.glove, interrupt)),
+    };
     if !options.json {
         finished.tell(&tell, "");
     } else if finished.ending.is_some() {
@@ -138,40 +148,57 @@ fn config(hand: Hand) -> Result<bridge::Config<AXES>> {
     bridge::Config::new(settings).map_err(crate::failure::told)
 }
 
-/// Everything before the clutch may close. Returns whether to go on.
+/// How the bring-up ended.
+enum Prepared {
+    /// The clutch may close.
+    Ready,
+    /// Somebody asked for the end.
+    Ended,
+    /// No sensor of the glove gave an orientation.
+    NoFrames,
+}
+
+impl From<bool> for Prepared {
+    fn from(go_on: bool) -> Self {
+        if go_on { Self::Ready } else { Self::Ended }
+    }
+}
+
+/// Everything before the clutch may close.
 fn prepare(
     options: &Teleop,
     run: &mut Run,
     tell: &Tell,
     interrupt: &Interrupt,
     status: Status<AXES>,
-) -> Result<bool> {
+) -> Result<Prepared> {
     tell.say(format_args!(
         "glove    {}  answers, bringing up its 16 sensors",
         options.glove.display()
     ));
     let framed = run.wait(FRAME_WAIT, |s| s.frame_sequence > 0)?;
     if interrupt.asked() {
-        return Ok(false);
+        return Ok(Prepared::Ended);
     }
     if !framed {
-        return Err(no_frames(&options.glove));
+        return Ok(Prepared::NoFrames);
     }
+    tell_missing(run, tell)?;
     if options.calibrate_flat && !run.calibrate(tell)? {
-        return Ok(false);
+        return Ok(Prepared::Ended);
     }
     if status.activation == Activation::Ready {
-        return Ok(true);
+        return Ok(Prepared::Ready);
     }
     if options.activate
         || run.ask_yes(
             "The gripper is not activated. Activation moves its fingers. Type yes to activate it: ",
         )?
     {
-        return activate(run, tell, interrupt);
+        return activate(run, tell, interrupt).map(Prepared::from);
     }
     if interrupt.asked() {
-        return Ok(false);
+        return Ok(Prepared::Ended);
     }
     if options.engage {
         return Err(Failure::new(
@@ -187,7 +214,25 @@ fn prepare(
     tell.say(format_args!(
         "not activated: you can watch the hand, the gripper will not move"
     ));
-    Ok(true)
+    Ok(Prepared::Ready)
+}
+
+/// Names the sensors that did not come up, as `doctor` does: their joints are held.
+fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
+    let all = |health: &[Health; SEGMENT_COUNT]| health.iter().all(|health| health.is_good());
+    let health = |seen: &Snapshot| seen.frame.map(|frame| frame.samples.map(|s| s.health));
+    run.wait(STRAGGLERS, |seen| health(seen).is_some_and(|h| all(&h)))?;
+    let seen = run.session().snapshot();
+    let Some(health) = seen.as_ref().and_then(health).filter(|health| !all(health)) else {
+        return Ok(());
+    };
+    for finding in diagnose::missing_sensors(&health).0 {
+        tell.say(format_args!("warning: {}", finding.what));
+        if let Some(next) = finding.next {
+            tell.say(format_args!("  try: {next}"));
+        }
+    }
+    Ok(())
 }
 
 /// Activates the gripper and waits until it is ready. Returns whether to go on.
@@ -222,16 +267,13 @@ pub(super) fn activate(run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> Res
     Ok(ready)
 }
 
-fn no_frames(path: &Path) -> anyhow::Error {
-    Failure::new(
-        format!(
-            "the glove's serial multiplexer on {} answers, but no sensor sent an orientation in {} s",
-            path.display(),
-            FRAME_WAIT.as_secs()
-        ),
-        "the cables between multiplexer and sensors, and their power",
-    )
-    .into()
+fn no_frames(path: &Path, interrupt: &Interrupt) -> anyhow::Error {
+    let what = format!(
+        "the glove's serial multiplexer on {} answers, but no sensor sent an orientation in {} s",
+        path.display(),
+        FRAME_WAIT.as_secs()
+    );
+    diagnose::no_sensors(&what, path, interrupt).into()
 }
 
 fn drive(options: &Teleop, run: &mut Run) -> Result<()> {

@@ -6,7 +6,9 @@ mod sensors;
 use std::path::Path;
 use std::time::Duration;
 
+use glove::hand::SEGMENT_COUNT;
 use glove::mux;
+use glove::scan::Health;
 
 use super::Findings;
 use super::answer::Came;
@@ -66,6 +68,29 @@ pub fn no_glove(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
             Failure::new(format!("{what} in time, though it answers now"), doctor)
         }
         None => Failure::new(what, doctor),
+    }
+}
+
+/// What is wrong with sensors that give no orientation, as `doctor` says it.
+pub fn missing_sensors(health: &[Health; SEGMENT_COUNT]) -> Findings {
+    let mut findings = Findings::default();
+    sensors::judge(health, &mut findings);
+    findings
+}
+
+/// Why no sensor of the glove at `path` gives an orientation, though its serial bridge answers. The failure begins with
+/// `what`.
+pub fn no_sensors(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
+    let findings = glove(path, interrupt);
+    match findings.first_wrong() {
+        Some(wrong) => Failure::new(
+            format!("{what}: {}", wrong.what),
+            wrong.next.clone().unwrap_or_default(),
+        ),
+        None => Failure::new(
+            format!("{what} in time, though they do now"),
+            "the same again",
+        ),
     }
 }
 

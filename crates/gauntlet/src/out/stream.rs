@@ -11,6 +11,8 @@ use crate::interrupt;
 
 /// Bytes that may wait. Only a program that prints much for a slow reader ever waits for room.
 const ROOM: usize = 1 << 18;
+/// Bytes that wait where a stream keeps up.
+const LITTLE: usize = 1 << 12;
 /// Bytes to one write on a terminal: a slow one (9600 baud) still shows that it takes something within 250 ms.
 const TERMINAL_CHUNK: usize = 128;
 /// Bytes to one write elsewhere.
@@ -84,6 +86,18 @@ impl Stream {
             }
         }
         self.changed.notify_all();
+    }
+
+    /// Puts `bytes` into the queue where little waits in it, and never waits: else they are dropped. For what is soon out of
+    /// date.
+    pub(super) fn offer(&'static self, bytes: &[u8]) {
+        let little = {
+            let state = self.lock();
+            state.waiting.len() < LITTLE
+        };
+        if little {
+            self.push(bytes);
+        }
     }
 
     fn wait<'a>(&self, state: MutexGuard<'a, State>, time: Duration) -> MutexGuard<'a, State> {

@@ -1,78 +1,114 @@
 //! The end of a run: how the gripper was left, the numbers, the log; and the one judgement over all of it.
 
 use anyhow::Result;
-use bridge::State;
+use bridge::{HoldReason, State};
 
 use super::Summary;
 use crate::failure::Failure;
 use crate::note;
-use crate::session::Snapshot;
 use crate::session_log::Written;
 use crate::stopped::Stopped;
 use crate::tell::Tell;
 
 /// How everything was when the run ended, before the clutch was opened.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Ending {
-    faulted: Option<State>,
-    /// The clutch opened by itself, and nobody was there to see it.
-    unattended: bool,
-    glove_answers: bool,
-    gripper_answers: bool,
+    /// State of the supervisor.
+    pub state: State,
+    /// Somebody could press keys.
+    pub attended: bool,
+    /// The clutch opened by itself, and nobody closed it again.
+    pub expired: bool,
+    /// What held the gripper for the last half second.
+    pub held: Option<HoldReason>,
+    /// Frames come from the glove.
+    pub glove_answers: bool,
+    /// They come, and none of the last half second could be used: why.
+    pub useless: Option<String>,
+    /// The gripper answers.
+    pub gripper_answers: bool,
+    /// It did not do what it was told: what.
+    pub disobeyed: Option<String>,
 }
 
 impl Ending {
-    /// From what was known last. `unattended`: the clutch opened by itself, and nobody was there to see it.
-    pub fn new(state: State, glove_answers: bool, gripper_answers: bool, unattended: bool) -> Self {
-        Self {
-            faulted: Some(state).filter(|state| matches!(state, State::Faulted(_))),
-            unattended,
-            glove_answers,
-            gripper_answers,
-        }
-    }
-
-    /// The same of a bridge in this process.
-    pub(super) fn of(seen: &Snapshot, unattended: bool) -> Self {
-        Self::new(
-            seen.state,
-            seen.glove_answers,
-            seen.gripper_answers,
-            unattended,
-        )
-    }
-
     /// A run that ends with something broken has failed.
     ///
     /// # Errors
     /// What was broken.
     pub fn judge(self) -> Result<()> {
-        if let Some(state) = self.faulted {
-            return Err(Failure::new(
-                format!("the run ended {state}"),
-                "`gauntlet gripper status --gripper PORT` with its port, which says what to do",
-            )
-            .into());
+        match self.failure() {
+            Some(failure) => Err(failure.into()),
+            None => Ok(()),
         }
-        if self.unattended {
-            return Err(clutch_expired().into());
+    }
+
+    fn failure(self) -> Option<Failure> {
+        if matches!(self.state, State::Faulted(_)) {
+            return Some(Failure::new(
+                format!("the run ended {}", self.state),
+                "`gauntlet gripper status --gripper PORT` with its port, which says what to do",
+            ));
+        }
+        if self.expired && !self.attended {
+            return Some(clutch_expired());
         }
         if !self.gripper_answers {
-            return Err(Failure::new(
+            return Some(Failure::new(
                 "the gripper no longer answers",
                 "its cable and its 24 V supply; `gauntlet doctor --gripper PORT` with its port",
-            )
-            .into());
+            ));
+        }
+        if let Some(what) = self.disobeyed {
+            return Some(Failure::new(
+                what,
+                "what holds its fingers, its emergency stop and its 24 V supply; `gauntlet gripper move --gripper PORT --to 100` \
+                 with its port, which moves it without a glove",
+            ));
         }
         if !self.glove_answers {
-            return Err(Failure::new(
+            return Some(Failure::new(
                 "the glove no longer sends frames",
                 "its cable and power; `gauntlet doctor --glove PORT` with its port",
-            )
-            .into());
+            ));
         }
-        Ok(())
+        if let Some(why) = self.useless {
+            return Some(Failure::new(
+                format!("the glove sends frames that cannot be used: {why}"),
+                "`gauntlet doctor --glove PORT` with its port, which names each sensor; calibrating again after it",
+            ));
+        }
+        held(self.held?, self.attended)
     }
+}
+
+/// A run that ended held for this reason: the glove's fault, or one that nobody was there to mend.
+fn held(reason: HoldReason, attended: bool) -> Option<Failure> {
+    let glove = matches!(
+        reason,
+        HoldReason::SensorsLost(_) | HoldReason::SamplesStale
+    );
+    let next = match reason {
+        HoldReason::SensorsLost(_) | HoldReason::SamplesStale => {
+            "`gauntlet doctor --glove PORT` with its port"
+        }
+        HoldReason::NotCalibrated => {
+            "--calibrate-flat, and the hand flat and still until it says done"
+        }
+        HoldReason::NoWeights => "`gauntlet flash MODEL --bridge PORT` with its port",
+        HoldReason::GripperNotReady(_) => "--activate: the fingers will move",
+        HoldReason::InputRefused | HoldReason::OutputRefused => {
+            "a map that was trained on this hand's whole range of motion"
+        }
+        // Over by themselves, or told as something else.
+        HoldReason::HeartbeatLost
+        | HoldReason::Settling
+        | HoldReason::StoreBusy
+        | HoldReason::GripperSilent
+        | HoldReason::ClockGap => return None,
+    };
+    let counts = glove || !attended;
+    counts.then(|| Failure::new(format!("the run ended held: {reason}"), next))
 }
 
 /// What a run is in which nobody saw that the clutch opened by itself.
@@ -188,12 +224,18 @@ mod tests {
         }
     }
 
-    const WELL: Ending = Ending {
-        faulted: None,
-        unattended: false,
-        glove_answers: true,
-        gripper_answers: true,
-    };
+    fn well() -> Ending {
+        Ending {
+            state: State::Following,
+            attended: false,
+            expired: false,
+            held: None,
+            glove_answers: true,
+            useless: None,
+            gripper_answers: true,
+            disobeyed: None,
+        }
+    }
 
     fn told(finished: Finished, driven: Result<()>) -> String {
         finished.judge(driven).unwrap_err().to_string()
@@ -203,51 +245,64 @@ mod tests {
     fn whether_the_gripper_moves_is_told_before_whatever_else_failed() {
         let silent = Ending {
             gripper_answers: false,
-            ..WELL
+            ..well()
         };
+        let silent = || Some(silent.clone());
         let driven = || Err(anyhow::anyhow!("the terminal does not work"));
-        let all = finished(Ok(Stopped::NotConfirmed), Some(silent), Some("disk full"));
+        let all = finished(Ok(Stopped::NotConfirmed), silent(), Some("disk full"));
         assert!(told(all, driven()).contains("not confirmed"));
-        let held = finished(Ok(Stopped::Held), Some(silent), Some("disk full"));
+        let held = finished(Ok(Stopped::Held), silent(), Some("disk full"));
         assert!(told(held, driven()).contains("terminal"));
-        let held = finished(Ok(Stopped::Held), Some(silent), Some("disk full"));
+        let held = finished(Ok(Stopped::Held), silent(), Some("disk full"));
         assert!(told(held, Ok(())).contains("gripper no longer answers"));
-        let held = finished(Ok(Stopped::Held), Some(WELL), Some("disk full"));
+        let held = finished(Ok(Stopped::Held), Some(well()), Some("disk full"));
         assert!(told(held, Ok(())).contains("incomplete: disk full"));
-        let well = finished(Ok(Stopped::Held), Some(WELL), None);
+        let well = finished(Ok(Stopped::Held), Some(well()), None);
         assert!(well.judge(Ok(())).is_ok());
     }
 
     #[test]
     fn a_run_that_ends_with_something_broken_has_failed() {
-        for (ending, word) in [
+        let fault = bridge::GripperFault::ActivationLost(gripper::Activation::Reset);
+        let some = |text: &str| Some(text.to_owned());
+        type Broken<'a> = (&'a dyn Fn(&mut Ending), &'a str);
+        let broken: [Broken<'_>; 7] = [
+            (&|end| end.state = State::Faulted(fault), "fault"),
+            (&|end| end.glove_answers = false, "glove no longer sends"),
+            (&|end| end.expired = true, "opened by itself"),
+            (&|end| end.useless = some("all frozen"), "all frozen"),
+            (&|end| end.disobeyed = some("never moved"), "never moved"),
             (
-                Ending {
-                    faulted: Some(State::Faulted(bridge::GripperFault::ActivationLost(
-                        gripper::Activation::Reset,
-                    ))),
-                    ..WELL
+                &|end| {
+                    end.attended = true;
+                    end.held = Some(HoldReason::SensorsLost(1));
                 },
-                "fault",
+                "sensors lost: hand",
             ),
             (
-                Ending {
-                    glove_answers: false,
-                    ..WELL
-                },
-                "glove",
+                &|end| end.held = Some(HoldReason::NotCalibrated),
+                "not calibrated",
             ),
-            (
-                Ending {
-                    unattended: true,
-                    ..WELL
-                },
-                "opened by itself",
-            ),
-        ] {
+        ];
+        for (breaks, word) in broken {
+            let mut ending = well();
+            breaks(&mut ending);
             let run = finished(Ok(Stopped::Held), Some(ending), None);
             let text = told(run, Ok(()));
             assert!(text.contains(word), "{text}");
+        }
+    }
+
+    #[test]
+    fn a_person_at_the_keys_may_end_a_run_that_waits_for_them() {
+        for held in [HoldReason::NotCalibrated, HoldReason::Settling] {
+            let ending = Ending {
+                attended: true,
+                held: Some(held),
+                ..well()
+            };
+            let run = finished(Ok(Stopped::Held), Some(ending), None);
+            assert!(run.judge(Ok(())).is_ok(), "{held:?}");
         }
     }
 }

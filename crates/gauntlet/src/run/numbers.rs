@@ -2,17 +2,15 @@
 
 use std::time::Duration;
 
+use bridge::event::Kind;
 use gripper::Instant;
 
-use super::Summary;
 use super::replies::Failed;
 use super::summary::rounded;
+use super::{MOVED_COUNTS, Obeyed, Summary};
 use crate::realtime::Scheduling;
 use crate::record::{AXES, Record, Sort};
 use crate::stats::{Percentiles, Rate};
-
-/// Counts an axis must have gone before that is called a motion: more than noise of the measured position.
-const MOVED_COUNTS: u8 = 4;
 
 /// Counters of a run, in bounded memory.
 #[derive(Debug, Default)]
@@ -40,6 +38,10 @@ pub struct Numbers {
     /// Positions when following began.
     start_positions: Option<[u8; AXES]>,
     first_motion: Option<Instant>,
+    /// What the gripper was told last, where that followed the hand.
+    told: Option<[u8; AXES]>,
+    /// Whether it went there.
+    pub obeyed: Obeyed,
     last_fault: Option<String>,
 }
 
@@ -68,6 +70,7 @@ impl Numbers {
             }
             Record::Command(command) => {
                 self.commands += 1;
+                self.told = command.age_us.map(|_| command.motion.position);
                 if command.first && core::mem::take(&mut self.unanswered) {
                     self.frames_answered += 1;
                 }
@@ -78,8 +81,14 @@ impl Numbers {
             Record::Status(status) => {
                 self.cycles.add(status.stamp.as_ticks());
                 self.look_for_motion(status.stamp, status.position);
+                self.obeyed.status(status, self.told);
             }
-            Record::Event { sort, text, .. } => {
+            Record::Event {
+                sort, text, kind, ..
+            } => {
+                if let Kind::AxisStands { axis } = kind {
+                    self.obeyed.stands(*axis);
+                }
                 if *sort == Sort::Fault {
                     self.faults += 1;
                     self.last_fault = Some(text.clone());

@@ -4,9 +4,10 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use bridge::State;
+use bridge::calibration::Try;
 use bridge::event::Kind;
-use glove::hand::LIMITS;
-use glove::scan::Health;
+use glove::hand::{LIMITS, SEGMENT_COUNT};
+use glove::scan::{Finding, Health};
 use gripper::{Activation, Contact, Status};
 
 use super::replies::Replies;
@@ -39,8 +40,8 @@ pub(super) struct Shown {
 }
 
 impl Shown {
-    /// A fault happened. The same thing again only renews what is shown.
-    pub(super) fn fault(&mut self, text: &str, kind: Kind) {
+    /// A fault, or what became of a calibration. The same thing again only renews what is shown.
+    pub(super) fn happened(&mut self, text: &str, kind: Kind) {
         self.recent.retain(|(_, known, _)| known != text);
         self.recent
             .push_back((Instant::now(), text.to_owned(), kind));
@@ -153,16 +154,38 @@ fn old(us: u64) -> Option<f32> {
     (us >= OLD_US).then_some(us as f32 / 1e6)
 }
 
+/// The sensors that are not used, by name, with what is wrong with them.
+fn unused_sensors(snapshot: &Snapshot) -> Vec<String> {
+    let mut unused = Vec::new();
+    if let Some(frame) = &snapshot.frame {
+        let health = frame.samples.map(|sample| sample.health);
+        unused.extend(words::lost_sensors(&health));
+    }
+    unused.extend(words::distrusted_sensors(snapshot.distrusted));
+    unused
+}
+
+/// Why the newest frames could not be used.
+pub(super) fn why_useless(snapshot: &Snapshot) -> String {
+    let unused = unused_sensors(snapshot);
+    if unused.is_empty() {
+        return "their joint angles are no numbers".to_owned();
+    }
+    unused.join("; ")
+}
+
 /// Whether the reason of a fault is gone.
 fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
     match kind {
         Kind::State { to, .. } => snapshot.state.name() != to.name(),
-        Kind::SensorLost { segment } => snapshot.frame.as_ref().is_some_and(|frame| {
-            frame
-                .samples
-                .get(*segment)
-                .is_some_and(|sample| sample.health == Health::Good)
-        }),
+        Kind::SensorLost { segment } => is_good(snapshot, *segment),
+        // As long as it is so, `standing` says it.
+        Kind::AxisStands { .. } => true,
+        Kind::SensorRestarted { segment } => snapshot.distrusted >> segment & 1 == 0,
+        Kind::Sensors(Finding::Jumped { segment, .. }) => snapshot.distrusted >> segment & 1 == 0,
+        Kind::Sensors(Finding::Frozen { segment }) => is_good(snapshot, (*segment).into()),
+        Kind::Sensors(Finding::AllFrozen) => (0..SEGMENT_COUNT).any(|k| is_good(snapshot, k)),
+        Kind::Calibration(end) => snapshot.calibration.newest != *end,
         Kind::Glove { .. } => snapshot.glove_answers,
         Kind::Gripper { .. } => snapshot.gripper_answers,
         Kind::GripperFault(_) => snapshot
@@ -170,6 +193,13 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
             .is_some_and(|status| status.fault == gripper::Fault::None),
         _ => false,
     }
+}
+
+fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
+    snapshot.frame.as_ref().is_some_and(|frame| {
+        let sample = frame.samples.get(segment);
+        sample.is_some_and(|sample| sample.health == Health::Good)
+    })
 }
 
 /// What is wrong now and stays so.
@@ -185,9 +215,13 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
         )),
         State::Idle | State::Blending | State::Following => {}
     }
-    if let Some(frame) = &snapshot.frame {
-        let health = frame.samples.map(|sample| sample.health);
-        faults.extend(words::lost_sensors(&health));
+    if snapshot.calibration.newest == Try::Waiting {
+        faults.push(Kind::Calibration(Try::Waiting).to_string());
+    }
+    faults.extend(unused_sensors(snapshot));
+    if let Some(axis) = snapshot.stands {
+        let kind = Kind::AxisStands { axis };
+        faults.push(kind.to_string());
     }
     if let Some(status) = &snapshot.status {
         if status.fault != gripper::Fault::None {
@@ -210,10 +244,9 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
 
 /// The fingers of the hand.
 pub(super) fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
-    let good = match &snapshot.frame {
-        Some(frame) => frame.samples.map(|sample| sample.health == Health::Good),
-        None => [false; glove::hand::SEGMENT_COUNT],
-    };
+    let good: [bool; SEGMENT_COUNT] = core::array::from_fn(|segment| {
+        is_good(snapshot, segment) && snapshot.distrusted >> segment & 1 == 0
+    });
     let good = words::fingers_good(&good);
     words::FINGER_NAMES
         .iter()

@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use rig::{Device, Instant};
@@ -130,6 +132,8 @@ pub struct Babble {
     pub bytes: Vec<u8>,
     pub pause: Duration,
     pub next: Instant,
+    /// Pieces so far.
+    pub said: Arc<AtomicU64>,
 }
 
 impl Babble {
@@ -138,6 +142,7 @@ impl Babble {
             bytes: bytes.to_vec(),
             pause,
             next: Instant::from_ticks(0),
+            said: Arc::default(),
         }
     }
 }
@@ -150,6 +155,7 @@ impl Device for Babble {
             return 0;
         }
         self.next = now + rig::Duration::from_micros(self.pause.as_micros().try_into().unwrap());
+        self.said.fetch_add(1, Ordering::Relaxed);
         let count = self.bytes.len().min(out.len());
         out[..count].copy_from_slice(&self.bytes[..count]);
         count

@@ -9,15 +9,31 @@ use std::thread::JoinHandle;
 use std::time::Duration;
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::fs::{Mode, OFlags, open};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{Winsize, tcsetwinsize};
 
 use super::command;
 
+/// Rows at the start; columns are 80.
+const ROWS: u16 = 24;
+
+fn size(rows: u16) -> Winsize {
+    Winsize {
+        ws_row: rows,
+        ws_col: 80,
+        ws_xpixel: 0,
+        ws_ypixel: 0,
+    }
+}
+
 /// A pseudo-terminal, and the tool on it.
 pub struct Terminal {
     pub child: Child,
     master: Option<OwnedFd>,
+    /// The side of the tool.
+    name: String,
+    rows: u16,
     reads: Arc<AtomicBool>,
     ends: Arc<AtomicBool>,
     seen: Arc<Mutex<Vec<u8>>>,
@@ -32,13 +48,7 @@ impl Terminal {
         let master = openpt(flags).unwrap();
         grantpt(&master).unwrap();
         unlockpt(&master).unwrap();
-        let size = Winsize {
-            ws_row: 24,
-            ws_col: 80,
-            ws_xpixel: 0,
-            ws_ypixel: 0,
-        };
-        tcsetwinsize(&master, size).unwrap();
+        tcsetwinsize(&master, size(ROWS)).unwrap();
         let name = ptsname(&master, Vec::new()).unwrap().into_string().unwrap();
         let side = || {
             let file = std::fs::File::options().read(true).write(true).open(&name);
@@ -61,6 +71,8 @@ impl Terminal {
         Self {
             child,
             master: Some(master),
+            name,
+            rows: ROWS,
             reads,
             ends,
             seen,
@@ -88,6 +100,24 @@ impl Terminal {
         self.ends.store(true, Ordering::Relaxed);
         self.reader.take().unwrap().join().unwrap();
         drop(self.master.take());
+    }
+
+    /// Fills it from the tool's side until it takes no more, with nobody reading.
+    pub fn fill(&self) {
+        self.stop_reading();
+        std::thread::sleep(Duration::from_millis(50));
+        let flags = OFlags::WRONLY | OFlags::NONBLOCK | OFlags::NOCTTY;
+        let side = open(self.name.as_str(), flags, Mode::empty()).unwrap();
+        while rustix::io::write(&side, &[b'.'; 256]).is_ok() {}
+    }
+
+    /// The view as it is now: at another size the tool draws all of it anew.
+    pub fn redrawn(&mut self) -> String {
+        let before = self.seen.lock().unwrap().len();
+        self.rows = if self.rows == ROWS { ROWS + 1 } else { ROWS };
+        tcsetwinsize(self.master.as_ref().unwrap(), size(self.rows)).unwrap();
+        std::thread::sleep(Duration::from_millis(600));
+        String::from_utf8_lossy(&self.seen.lock().unwrap()[before..]).into_owned()
     }
 
     /// All that was drawn, with the terminal's control sequences.

@@ -69,6 +69,8 @@ pub(super) struct Faults {
     pub reset_in_read: bool,
     /// Clock stretching for each data byte.
     pub stretch: Option<Duration>,
+    /// A register of page 0 that keeps its value whatever is written.
+    pub stuck: Option<u8>,
 }
 
 /// The chip.
@@ -258,6 +260,9 @@ impl Bno055 {
             if interrupts || (configurable && config) {
                 self.pages[1][usize::from(address)] = value;
             }
+            return;
+        }
+        if self.faults.stuck == Some(address) {
             return;
         }
         match address {

@@ -51,6 +51,11 @@ impl VirtualGlove {
         self.sensor(index, |chip| chip.faults.frozen = frozen);
     }
 
+    /// Register `address` of page 0 of sensor `index` keeps its value, whatever is written into it.
+    pub fn stick_register(&self, index: usize, address: u8) {
+        self.sensor(index, |chip| chip.faults.stuck = Some(address));
+    }
+
     /// The next `count` accesses of sensor `index` are not acknowledged.
     pub fn nack(&self, index: usize, count: u32) {
         self.sensor(index, |chip| chip.faults.nacks = count);

@@ -21,10 +21,10 @@ use trainer::reproduce::{Laboratory, Source, Store};
 use super::train::{Schedule, deviation};
 use crate::failure::{OrFail, told};
 use crate::interrupt::Interrupt;
-use crate::out;
 use crate::poses::Motion;
 use crate::stats::seconds;
 use crate::tell::Tell;
+use crate::{out, reading};
 use what::{Frame, What};
 use work::Work;
 
@@ -134,7 +134,9 @@ pub(super) struct Bench<'a> {
 pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let motion = match &options.poses {
-        Some(path) => Some(Motion::open_for_training(Some(path), 0)?),
+        Some(path) => Some(reading::ended_by(interrupt, "the recording", || {
+            Motion::open_for_training(Some(path), 0)
+        })?),
         None => None,
     };
     let recording = motion.as_ref().map(Motion::frames);

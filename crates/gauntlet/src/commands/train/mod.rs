@@ -23,7 +23,7 @@ use crate::quality::{Measured, Quality};
 use crate::stats::seconds;
 use crate::tell::Tell;
 use crate::training::{Course, Ended, Task, domains, hand};
-use crate::{out, outputs};
+use crate::{out, outputs, reading};
 
 /// Trains on a recording of a hand, or on samples of any two domains.
 ///
@@ -32,28 +32,9 @@ use crate::{out, outputs};
 pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_outputs(options)?;
-    let mut task = match (&options.poses, &options.input, &options.target) {
-        (Some(poses), ..) => {
-            let motion = Motion::open_for_training(Some(poses), options.seed)?;
-            tell.say(format_args!("poses      {}", motion.describe()));
-            hand::task(
-                &motion,
-                &hand_pairs(options),
-                options.seed,
-                options.hold_out,
-            )?
-        }
-        (_, Some(input), Some(target)) => {
-            let task = domains::task(&domain_files(options, input, target))?;
-            tell.say(format_args!("input      {}", task.describe_inputs(input)));
-            tell.say(format_args!("target     {}", task.describe_targets(target)));
-            task
-        }
-        _ => {
-            let what = "there is nothing to train on";
-            return Err(Failure::usage(what, "--poses, or --input with --target").into());
-        }
-    };
+    let mut task = reading::ended_by(interrupt, "what is to be trained on", || {
+        task(options, &tell)
+    })?;
     let course = course(options);
     describe(options, &task, &course, &tell);
     let mut learned = match crate::training::learn(&mut task, &course, interrupt)? {
@@ -101,6 +82,28 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     }
     tell.say(format_args!("model      {}", options.out.display()));
     Ok(())
+}
+
+/// What to train on, read and told.
+fn task(options: &Train, tell: &Tell) -> Result<Task> {
+    match (&options.poses, &options.input, &options.target) {
+        (Some(poses), ..) => {
+            let motion = Motion::open_for_training(Some(poses), options.seed)?;
+            tell.say(format_args!("poses      {}", motion.describe()));
+            let pairs = hand_pairs(options);
+            hand::task(&motion, &pairs, options.seed, options.hold_out)
+        }
+        (_, Some(input), Some(target)) => {
+            let task = domains::task(&domain_files(options, input, target))?;
+            tell.say(format_args!("input      {}", task.describe_inputs(input)));
+            tell.say(format_args!("target     {}", task.describe_targets(target)));
+            Ok(task)
+        }
+        _ => {
+            let what = "there is nothing to train on";
+            Err(Failure::usage(what, "--poses, or --input with --target").into())
+        }
+    }
 }
 
 /// Saves a finished training before anything else is computed. Where the place that was tried before takes it no more, it goes where

@@ -17,6 +17,8 @@ use crate::port::Port;
 const BRING_UP: Duration = Duration::from_secs(6);
 /// The same at 9600 baud.
 const BRING_UP_SLOW: Duration = Duration::from_secs(20);
+/// By so much later all sensors that fail in a step again and again are through with it.
+const STUBBORN: Duration = Duration::from_secs(12);
 /// Time for a sensor to come after the first frame.
 const STRAGGLERS: Duration = Duration::from_secs(2);
 /// The longest wait between two looks.
@@ -37,9 +39,13 @@ pub fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrup
         BRING_UP
     };
     let mut end = Instant::now() + time;
+    let longest = end + STUBBORN;
     let (mut frames, mut since) = (0_u32, Instant::now());
     let mut seen = [Seen::default(); SEGMENT_COUNT];
-    while Instant::now() < end && !interrupt.asked() {
+    let tried = |scanner: &Scanner<Port>| scanner.state() != State::Starting;
+    while (Instant::now() < end || !tried(&scanner) && Instant::now() < longest)
+        && !interrupt.asked()
+    {
         let now = pc.now();
         let Some(frame) = scanner.poll(now) else {
             let due = scanner.next_due().unwrap_or(now + LOOK);
@@ -126,7 +132,8 @@ fn unsteady(k: usize, seen: &Seen, findings: &mut Findings) {
     }
 }
 
-fn judge(health: &[Health; SEGMENT_COUNT], findings: &mut Findings) {
+/// Tells which sensors are not good, and why; those of one channel together.
+pub fn judge(health: &[Health; SEGMENT_COUNT], findings: &mut Findings) {
     let lost: Vec<usize> = (0..SEGMENT_COUNT)
         .filter(|k| !health[*k].is_good())
         .collect();

@@ -1,0 +1,168 @@
+//! Why a port does not open, in a person's words.
+
+use std::os::unix::fs::{FileTypeExt, MetadataExt};
+use std::path::{Path, PathBuf};
+
+use rustix::io::Errno;
+
+use crate::failure::Failure;
+
+/// Why a port could not be opened.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum OpenError {
+    /// Nothing has that name, or a link leads nowhere.
+    #[error("the port {} does not exist{}", path.display(), link_note(target.as_deref()))]
+    Missing {
+        /// As given.
+        path: PathBuf,
+        /// Where a dangling link points.
+        target: Option<PathBuf>,
+    },
+    /// The system refuses it to this user.
+    #[error("no permission to open the port {} (group {group})", path.display())]
+    Permission {
+        /// As given.
+        path: PathBuf,
+        /// The group that may.
+        group: String,
+    },
+    /// Somebody else has it.
+    #[error("the port {} is in use by another program", path.display())]
+    Busy {
+        /// As given.
+        path: PathBuf,
+    },
+    /// It exists and is something else.
+    #[error("{} is {kind}, not a serial port", path.display())]
+    NotSerial {
+        /// As given.
+        path: PathBuf,
+        /// What it is, with its article.
+        kind: &'static str,
+    },
+    /// Whatever else the system says.
+    #[error("the port {} did not open at {baud} baud: {cause}", path.display())]
+    System {
+        /// As given.
+        path: PathBuf,
+        /// The speed asked for.
+        baud: u32,
+        /// The system's words.
+        cause: String,
+    },
+}
+
+fn link_note(target: Option<&Path>) -> String {
+    target.map_or_else(String::new, |target| {
+        format!(" (a link to {}, which is gone)", target.display())
+    })
+}
+
+impl From<OpenError> for Failure {
+    fn from(error: OpenError) -> Self {
+        let next = match &error {
+            OpenError::Missing { target: None, .. } => {
+                "plug the adapter in, and `gauntlet ports` to see the ports there are".to_owned()
+            }
+            OpenError::Missing { .. } => {
+                "start whatever makes the link (`gauntlet simulate`, say) again".to_owned()
+            }
+            OpenError::Permission { group, .. } => {
+                format!("`sudo usermod -aG {group} $USER`, then log out and in again")
+            }
+            OpenError::Busy { path } => {
+                format!(
+                    "`fuser -v {}` to see which program, and end it",
+                    path.display()
+                )
+            }
+            OpenError::NotSerial { .. } => {
+                "`gauntlet ports` to see the serial ports there are".to_owned()
+            }
+            OpenError::System { .. } => {
+                "another adapter or cable, and `dmesg` for what the system says".to_owned()
+            }
+        };
+        Self::new(error.to_string(), next)
+    }
+}
+
+pub(super) fn system(path: &Path, baud: u32, cause: impl std::fmt::Display) -> OpenError {
+    OpenError::System {
+        path: path.to_owned(),
+        baud,
+        cause: cause.to_string(),
+    }
+}
+
+/// Names what is not a serial port before the terminal calls fail on it with something obscure.
+pub(super) fn check_kind(path: &Path) -> Result<(), OpenError> {
+    let kind = match std::fs::metadata(path) {
+        Ok(metadata) => metadata.file_type(),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
+            return Err(OpenError::Missing {
+                path: path.to_owned(),
+                target: std::fs::read_link(path).ok(),
+            });
+        }
+        // Let opening say what is wrong.
+        Err(_) => return Ok(()),
+    };
+    let kind = if kind.is_file() {
+        "a file"
+    } else if kind.is_dir() {
+        "a folder"
+    } else if kind.is_socket() {
+        "a socket"
+    } else if kind.is_fifo() {
+        "a named pipe"
+    } else if kind.is_block_device() {
+        "a disk"
+    } else {
+        return Ok(());
+    };
+    Err(OpenError::NotSerial {
+        path: path.to_owned(),
+        kind,
+    })
+}
+
+pub(super) fn classify(path: &Path, baud: u32, error: &serialport::Error) -> OpenError {
+    use serialport::ErrorKind;
+    let path = path.to_owned();
+    match error.kind() {
+        ErrorKind::NoDevice => OpenError::Busy { path },
+        ErrorKind::Io(std::io::ErrorKind::PermissionDenied) => OpenError::Permission {
+            group: group_of(&path),
+            path,
+        },
+        ErrorKind::Io(std::io::ErrorKind::NotFound) => OpenError::Missing { path, target: None },
+        // `/dev/null` and its like: a character device that is no terminal (ENOTTY).
+        _ if error.description == Errno::NOTTY.to_string()
+            || error.description.contains("typewriter")
+            || error.description.contains("Inappropriate ioctl") =>
+        {
+            OpenError::NotSerial {
+                path,
+                kind: "a device without serial settings",
+            }
+        }
+        _ => system(&path, baud, &error.description),
+    }
+}
+
+/// Name of the group that owns `path`; "dialout", the usual one, where it cannot be found out.
+fn group_of(path: &Path) -> String {
+    let found = std::fs::metadata(path).ok().and_then(|metadata| {
+        let groups = std::fs::read_to_string("/etc/group").ok()?;
+        let id = metadata.gid().to_string();
+        groups.lines().find_map(|line| {
+            let mut fields = line.split(':');
+            let name = fields.next()?;
+            (fields.nth(1)? == id).then(|| name.to_owned())
+        })
+    });
+    found
+        .filter(|name| name != "root")
+        .unwrap_or_else(|| "dialout".to_owned())
+}

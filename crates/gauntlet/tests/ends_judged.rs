@@ -1,0 +1,140 @@
+//! What a run that has ended says of itself: its log, its exit code, and what was broken.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod support;
+
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+use support::bench::{Bench, Running, standing};
+use support::{command, refusal, run, text};
+
+#[test]
+fn a_log_never_replaces_a_file_and_a_bring_up_that_fails_leaves_none() {
+    let bench = Bench::inactive(&["--engage", "--seconds", "1"]);
+    std::fs::write(&bench.log, "\u{89}MCAP0\r\nprecious").unwrap();
+    let output = run(&bench.arguments());
+    assert!(refusal(&output, 2).contains("exists"));
+    assert!(
+        std::fs::read_to_string(&bench.log)
+            .unwrap()
+            .ends_with("precious")
+    );
+    std::fs::remove_file(&bench.log).unwrap();
+    // Engaged, but not activated: refused at the end of the bring-up.
+    let refused = refusal(&run(&bench.arguments()), 1);
+    assert!(refused.contains("not activated"), "{refused}");
+    assert!(!bench.log.exists(), "a file is in the way of the next try");
+}
+
+#[test]
+fn a_log_that_can_grow_no_more_is_told_while_the_run_goes_on_and_stays_readable() {
+    let bench = Bench::new(&["--engage", "--seconds", "6"]);
+    let line = format!(
+        "ulimit -f 300; exec {} {}",
+        env!("CARGO_BIN_EXE_gauntlet"),
+        bench.arguments.join(" ")
+    );
+    let running = Running::start(
+        Command::new("bash")
+            .args(["-c", &line])
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    );
+    let output = running.finish();
+    let error = refusal(&output, 1);
+    assert!(error.contains("is incomplete"), "{error}");
+    let said = text(&output.stdout);
+    assert!(said.contains("the run goes on without it"), "{said}");
+    assert!(said.contains("the gripper is held where it is"), "{said}");
+    assert!(said.contains("rates "), "{said}");
+    let bytes = std::fs::read(&bench.log).unwrap();
+    let whole = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap);
+    let count = whole.count();
+    assert!(count > 50, "{count} messages");
+    assert!(error.contains(&format!(" {count} messages")), "{error}");
+}
+
+#[test]
+fn a_run_that_ends_without_its_glove_has_failed() {
+    let mut bench = Bench::new(&["--engage", "--seconds", "8"]);
+    let mut running = Running::start(
+        command(&bench.arguments())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    );
+    let child = &mut running.0;
+    bench.until_moving(child);
+    drop(bench.glove_port.take());
+    let output = running.finish();
+    assert!(refusal(&output, 1).contains("glove"));
+    let said = text(&output.stdout);
+    assert!(said.contains("the gripper is held where it is"), "{said}");
+}
+
+/// A run of some seconds from where something was commanded, with `what` done to its devices then; its end.
+fn after(bench: &mut Bench, what: impl FnOnce(&mut Bench)) -> std::process::Output {
+    let mut running = Running::start(
+        command(&bench.arguments())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    );
+    bench.until_commanded(&mut running.0);
+    bench.hand_moves();
+    what(bench);
+    running.finish()
+}
+
+#[test]
+fn a_run_whose_glove_gives_nothing_that_can_be_used_until_its_end_has_failed() {
+    type Broken<'a> = (&'a dyn Fn(&Bench), &'a str);
+    let broken: [Broken<'_>; 4] = [
+        (
+            &|bench| (0..16).for_each(|k| bench.glove.freeze(k, true)),
+            "frozen",
+        ),
+        (
+            &|bench| (0..16).for_each(|k| bench.glove.unplug(k, true)),
+            "no longer sends frames",
+        ),
+        (&|bench| bench.glove.unplug(0, true), "sensor hand"),
+        (
+            &|bench| bench.glove.set_heading(0, 2.0),
+            "sensor hand jumped",
+        ),
+    ];
+    for (breaks, words) in broken {
+        let mut bench = Bench::new(&["--engage", "--seconds", "6"]);
+        let output = after(&mut bench, |bench| breaks(bench));
+        let error = refusal(&output, 1);
+        assert!(error.contains("glove") && error.contains(words), "{error}");
+        let said = text(&output.stdout);
+        assert!(said.contains("the gripper is held where it is"), "{said}");
+    }
+}
+
+#[test]
+fn a_run_whose_glove_came_back_has_not_failed() {
+    let mut bench = Bench::new(&["--engage", "--seconds", "9"]);
+    let output = after(&mut bench, |bench| {
+        bench.glove.freeze(3, true);
+        std::thread::sleep(Duration::from_secs(2));
+        bench.glove.freeze(3, false);
+    });
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+}
+
+#[test]
+fn a_run_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
+    for contact in [0x00, 0xFF] {
+        let options = ["--engage", "--seconds", "9"];
+        let mut bench = Bench::behind(|gripper| standing(gripper, contact), &options);
+        bench.gripper.preset_active();
+        let output = after(&mut bench, |_| {});
+        let error = refusal(&output, 1);
+        assert!(error.contains("never moved"), "{contact:02X}: {error}");
+    }
+}

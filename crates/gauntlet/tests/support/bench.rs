@@ -1,0 +1,234 @@
+//! A whole session at a bench: the tool between a virtual glove, whose hand can be told to move, and a virtual gripper.
+
+use std::io::Read;
+use std::path::PathBuf;
+use std::process::{Child, Command};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use std::time::{Duration, Instant};
+
+use rig::Device;
+use rig::glove::VirtualGlove;
+use rig::gripper::{Config, VirtualGripper};
+use rig::pty::{Handle, PtyDevice};
+use rustix::process::{Pid, Signal, kill_process};
+
+use super::lines::{Shaped, at_once};
+use super::{devices, model, wait};
+
+/// An orderly end: 1.5 s for the hold, 2 s for what is printed, and a busy machine.
+pub const SOON: Duration = Duration::from_secs(12);
+/// For a run to be brought up and to move.
+pub const BRINGUP: Duration = Duration::from_secs(40);
+
+/// A glove whose hand lies flat until something is commanded, and an active gripper whose true state can be looked at.
+pub struct Bench {
+    pub gripper: VirtualGripper,
+    _gripper_port: Handle,
+    pub glove: VirtualGlove,
+    pub glove_port: Option<Handle>,
+    moves: Arc<AtomicBool>,
+    pub arguments: Vec<String>,
+    pub log: PathBuf,
+    _folder: tempfile::TempDir,
+}
+
+/// Flat, then all fingers bend and stretch every 4 s.
+pub fn hand(moves: Arc<AtomicBool>) -> impl Fn(f64) -> [f32; 25] {
+    let since = Mutex::new(None);
+    move |time| {
+        let mut angles = [0.0; 25];
+        if moves.load(Ordering::Relaxed) {
+            let begin = *since.lock().unwrap().get_or_insert(time);
+            let bent = 0.5 - 0.5 * ((time - begin) * std::f64::consts::FRAC_PI_2).cos();
+            for finger in 1..5 {
+                angles[5 * finger] = bent as f32;
+                angles[5 * finger + 3] = bent as f32;
+            }
+        }
+        angles
+    }
+}
+
+impl Bench {
+    /// The gripper is active; `more` options for the run.
+    pub fn new(more: &[&str]) -> Self {
+        let bench = Self::inactive(more);
+        bench.gripper.preset_active();
+        bench
+    }
+
+    pub fn inactive(more: &[&str]) -> Self {
+        Self::behind(|gripper| Box::new(gripper), more)
+    }
+
+    /// The same behind a line that does something to the gripper's words.
+    pub fn behind(line: impl FnOnce(VirtualGripper) -> Box<dyn Device>, more: &[&str]) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let moves = Arc::new(AtomicBool::new(false));
+        let glove = VirtualGlove::new(
+            Box::new(hand(Arc::clone(&moves))),
+            rig::glove::Config::at_baud(115_200),
+        );
+        let (glove_port, glove_path) = devices::behind_pty(glove.clone());
+        let gripper = VirtualGripper::new(Config::default());
+        let gripper_port = PtyDevice::spawn(line(gripper.clone()), None).unwrap();
+        let log = folder.path().join("run.mcap");
+        let words = [
+            "teleop",
+            "--glove",
+            &glove_path,
+            "--gripper",
+            gripper_port.path().to_str().unwrap(),
+            "--model",
+            model().to_str().unwrap(),
+            "--calibrate-flat",
+            "--log",
+            log.to_str().unwrap(),
+        ];
+        let arguments = words.iter().chain(more).map(|word| (*word).to_owned());
+        Self {
+            gripper,
+            arguments: arguments.collect(),
+            _gripper_port: gripper_port,
+            glove,
+            glove_port: Some(glove_port),
+            moves,
+            log,
+            _folder: folder,
+        }
+    }
+
+    /// From now on the hand moves.
+    pub fn hand_moves(&self) {
+        self.moves.store(true, Ordering::Relaxed);
+    }
+
+    /// Until something is commanded.
+    pub fn until_commanded(&self, child: &mut Child) {
+        let end = Instant::now() + BRINGUP;
+        while self.gripper.writes() == 0 {
+            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+            assert!(Instant::now() < end, "nothing was commanded");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    pub fn arguments(&self) -> Vec<&str> {
+        self.arguments.iter().map(String::as_str).collect()
+    }
+
+    /// Until the gripper has gone some way after the hand.
+    pub fn until_moving(&self, child: &mut Child) {
+        self.until_commanded(child);
+        self.hand_moves();
+        let begin = self.gripper.positions();
+        let moved = |now: [f32; 4]| begin.iter().zip(now).any(|(a, b)| (a - b).abs() > 8.0);
+        let end = Instant::now() + BRINGUP;
+        while !moved(self.gripper.positions()) {
+            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+            assert!(Instant::now() < end, "it did not move");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+
+    /// Whether anything is commanded anew for `time`.
+    pub fn stands_for(&self, time: Duration) -> bool {
+        let begin = self.gripper.command_block();
+        let end = Instant::now() + time;
+        while Instant::now() < end {
+            if self.gripper.command_block() != begin {
+                return false;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        true
+    }
+
+    /// The commands of the finished log.
+    pub fn commands(&self) -> Vec<serde_json::Value> {
+        let bytes = std::fs::read(&self.log).unwrap();
+        assert!(mcap::Summary::read(&bytes).unwrap().is_some(), "no index");
+        mcap::MessageStream::new(&bytes)
+            .unwrap()
+            .map(Result::unwrap)
+            .filter(|message| message.channel.topic == "/gripper/command")
+            .map(|message| serde_json::from_slice(&message.data).unwrap())
+            .collect()
+    }
+
+    pub fn last_command_is_a_hold(&self) {
+        let commands = self.commands();
+        let last = commands.last().expect("something was commanded");
+        assert!(last["age_us"].is_null(), "no hold at the end: {last}");
+    }
+}
+
+/// A child that does not outlive a test that fails: it would go on looking for its ports, which others get.
+pub struct Running(pub Child);
+
+impl Running {
+    pub fn start(command: &mut Command) -> Self {
+        Self(command.spawn().unwrap())
+    }
+
+    /// What it said, once it has ended.
+    pub fn finish(mut self) -> std::process::Output {
+        let read = |from: Option<&mut dyn Read>| {
+            let mut bytes = Vec::new();
+            from.map(|from| from.read_to_end(&mut bytes).unwrap());
+            bytes
+        };
+        let stdout = read(self.0.stdout.as_mut().map(|from| from as &mut dyn Read));
+        let stderr = read(self.0.stderr.as_mut().map(|from| from as &mut dyn Read));
+        let status = wait(&mut self.0);
+        std::process::Output {
+            status,
+            stdout,
+            stderr,
+        }
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+/// Its exit code, or a failure where it does not end.
+pub fn ends_soon(child: &mut Child) -> Option<i32> {
+    let end = Instant::now() + SOON;
+    loop {
+        if let Some(status) = child.try_wait().unwrap() {
+            return status.code();
+        }
+        if Instant::now() > end {
+            child.kill().unwrap();
+            panic!("it did not end in {SOON:?}");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+pub fn send(child: &Child, signal: Signal) {
+    let id = Pid::from_raw(i32::try_from(child.id()).unwrap()).unwrap();
+    kill_process(id, signal).unwrap();
+}
+
+/// A gripper that takes every command and says that its fingers are where they were, moving or at their position.
+pub fn standing(gripper: VirtualGripper, contact: u8) -> Box<dyn Device> {
+    Box::new(Shaped::new(gripper, move |mut frame| {
+        if frame.len() >= 21 && matches!(frame[1], 3 | 4 | 23) && frame[2] == 16 {
+            frame[3 + 1] = contact;
+            for axis in 0..4 {
+                frame[3 + 4 + 3 * axis] = 30;
+            }
+            let body = frame.len() - 2;
+            let crc = gripper::rtu::crc16(&frame[..body]).to_le_bytes();
+            frame[body..].copy_from_slice(&crc);
+        }
+        at_once(frame)
+    }))
+}
