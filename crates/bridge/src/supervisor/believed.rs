@@ -1,7 +1,7 @@
 //! Which of the gripper's positions are believed: a position no finger can have reached is not commanded from.
 
 use crate::{Duration, Instant, timing};
-use gripper::travel::{Plausibility, Speed, Verdict};
+use gripper::travel::{DOUBTS, Plausibility, Speed, Verdict};
 use gripper::{Activation, Contact, Motion, Status};
 
 /// The statuses of one gripper, judged.
@@ -15,6 +15,9 @@ pub(super) struct Believed<const X: usize> {
     /// The positions are looked at anew: the first that are confirmed tell whether it is where it was left.
     anew: bool,
     left: Option<Left<X>>,
+    /// Stamp of the newest status, and how many in a row said that it is not activated.
+    newest: Option<Instant>,
+    unready: u8,
 }
 
 /// What its positions are worth; the axis is the one that spoke against them.
@@ -86,6 +89,8 @@ impl<const X: usize> Believed<X> {
             trust: Trust::Sound,
             anew: true,
             left: None,
+            newest: None,
+            unready: 0,
         }
     }
 
@@ -113,13 +118,7 @@ impl<const X: usize> Believed<X> {
 
     /// Judges the newest status; the same one may come again.
     pub fn take(&mut self, now: Instant, status: &Status<X>) -> Judged<X> {
-        if !matches!(
-            status.activation,
-            Activation::Ready | Activation::ChangingMode
-        ) {
-            // An activation finds the stops.
-            (self.trust, self.left) = (Trust::Sound, None);
-        }
+        self.watch_activation(status);
         match self.plausibility.take(status, now) {
             Verdict::Used { .. } => {
                 if core::mem::take(&mut self.anew) {
@@ -151,6 +150,24 @@ impl<const X: usize> Believed<X> {
         Judged {
             status,
             implausible,
+        }
+    }
+
+    /// An activation finds the stops: after it the positions count anew. One status without it may be a slip.
+    fn watch_activation(&mut self, status: &Status<X>) {
+        if self.newest.replace(status.stamp) == Some(status.stamp) {
+            return;
+        }
+        if matches!(
+            status.activation,
+            Activation::Ready | Activation::ChangingMode
+        ) {
+            self.unready = 0;
+            return;
+        }
+        self.unready = self.unready.saturating_add(1);
+        if self.unready >= DOUBTS {
+            (self.trust, self.left) = (Trust::Sound, None);
         }
     }
 
