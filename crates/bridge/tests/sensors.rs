@@ -241,3 +241,33 @@ fn no_joint_of_a_hand_within_its_limits_is_held_though_each_sensor_sits_20_degre
         }
     }
 }
+
+#[test]
+fn a_calibration_taken_back_trusts_no_sensor_that_jumped_or_restarted_since() {
+    for restarts in [false, true] {
+        let mut bench = following();
+        bench.release();
+        bench.run(100 * MS);
+        if restarts {
+            let now = bench.clock.now();
+            bench.glove.reset_sensor(0, now);
+            bench.run(4 * S);
+        } else {
+            bench.glove.set_heading(0, core::f32::consts::FRAC_PI_2);
+            bench.run(S);
+        }
+        assert!(!bench.app.telemetry().calibration.is_calibrated);
+        // A new one counts from now on, and is taken back.
+        bench
+            .app
+            .set_calibration(glove::hand::Calibration::identity());
+        bench.run(100 * MS);
+        assert!(bench.app.telemetry().calibration.is_calibrated);
+        bench.app.undo_calibration();
+        bench.run(200 * MS);
+        assert!(
+            !bench.app.telemetry().calibration.is_calibrated,
+            "restarts: {restarts}"
+        );
+    }
+}

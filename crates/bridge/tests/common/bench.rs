@@ -15,17 +15,33 @@ pub const MS: u64 = 1_000;
 pub const S: u64 = 1_000_000;
 
 /// Time moves to the next event; a step of the loop costs 50 µs.
-pub struct Virtual(pub Clock);
+pub struct Virtual {
+    clock: Clock,
+    /// The machine stands still for so long, us, before the time is asked for again within a step.
+    stall: u64,
+    asked: bool,
+}
+
+impl Virtual {
+    /// Between the first and the second time the next step asks for the time, the machine stands still for `us`; zero: not.
+    pub fn stall_in_step(&mut self, us: u64) {
+        (self.stall, self.asked) = (us, false);
+    }
+}
 
 impl Platform for Virtual {
     fn now(&mut self) -> Instant {
-        self.0.now()
+        if self.stall > 0 && core::mem::replace(&mut self.asked, true) {
+            self.clock
+                .advance(rig::Duration::from_micros(core::mem::take(&mut self.stall)));
+        }
+        self.clock.now()
     }
 
     fn wait_until(&mut self, due: Instant) {
-        self.0.advance(rig::Duration::from_micros(50));
-        if due > self.0.now() {
-            self.0.wait_until(due);
+        self.clock.advance(rig::Duration::from_micros(50));
+        if due > self.clock.now() {
+            self.clock.wait_until(due);
         }
     }
 }
@@ -107,7 +123,11 @@ impl Bench {
             store.commit().expect("a sound image");
         }
         let app = App::new(
-            Virtual(clock.clone()),
+            Virtual {
+                clock: clock.clone(),
+                stall: 0,
+                asked: false,
+            },
             glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
             ThreeFinger::new(gripper_wire.clone(), driver),
             store,
