@@ -84,35 +84,3 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     );
     assert!(commands > STALLS * 3 / 4, "{commands} commands");
 }
-
-#[test]
-fn a_command_that_was_decided_before_the_machine_stood_still_in_the_same_step_does_not_leave() {
-    let mut bench = Bench::new(Settings::default());
-    bench.ready();
-    bench.follow();
-    let mut caught = 0;
-    for round in 0..400u64 {
-        if !bench.state().is_moving() {
-            bench.release();
-            bench.run(50 * MS);
-            bench.clutch = true;
-            bench.until("following", |bench| bench.state() == State::Following);
-        }
-        bench.set_pose(FIST.map(|angle| angle * (round % 7) as f32 / 6.0));
-        bench.run(40 * MS + round * 137 % (20 * MS));
-        // Whoever asks for the time a second time finds it two seconds later.
-        bench.app.platform_mut().stall_in_step(2 * S);
-        let began = bench.now();
-        bench.app.step();
-        caught += u64::from(bench.now() >= began + 2 * S);
-        // What left at the step's beginning had been decided before.
-        let decided = bench
-            .app
-            .telemetry()
-            .sent
-            .map(|sent| sent.decided.as_ticks());
-        assert_ne!(decided, Some(began), "round {round}: it left 2 s late");
-        bench.app.platform_mut().stall_in_step(0);
-    }
-    assert!(caught > 20, "{caught} steps looked at the clock twice");
-}

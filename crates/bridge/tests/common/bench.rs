@@ -15,33 +15,17 @@ pub const MS: u64 = 1_000;
 pub const S: u64 = 1_000_000;
 
 /// Time moves to the next event; a step of the loop costs 50 µs.
-pub struct Virtual {
-    clock: Clock,
-    /// The machine stands still for so long, us, before the time is asked for again within a step.
-    stall: u64,
-    asked: bool,
-}
-
-impl Virtual {
-    /// Between the first and the second time the next step asks for the time, the machine stands still for `us`; zero: not.
-    pub fn stall_in_step(&mut self, us: u64) {
-        (self.stall, self.asked) = (us, false);
-    }
-}
+pub struct Virtual(pub Clock);
 
 impl Platform for Virtual {
     fn now(&mut self) -> Instant {
-        if self.stall > 0 && core::mem::replace(&mut self.asked, true) {
-            self.clock
-                .advance(rig::Duration::from_micros(core::mem::take(&mut self.stall)));
-        }
-        self.clock.now()
+        self.0.now()
     }
 
     fn wait_until(&mut self, due: Instant) {
-        self.clock.advance(rig::Duration::from_micros(50));
-        if due > self.clock.now() {
-            self.clock.wait_until(due);
+        self.0.advance(rig::Duration::from_micros(50));
+        if due > self.0.now() {
+            self.0.wait_until(due);
         }
     }
 }
@@ -123,11 +107,7 @@ impl Bench {
             store.commit().expect("a sound image");
         }
         let app = App::new(
-            Virtual {
-                clock: clock.clone(),
-                stall: 0,
-                asked: false,
-            },
+            Virtual(clock.clone()),
             glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
             ThreeFinger::new(gripper_wire.clone(), driver),
             store,
