@@ -1,7 +1,11 @@
-//! From a frame of the glove to joint angles, with the joints beside a lost sensor held (rule 4).
+//! From a frame of the glove to joint angles, with the joints beside a lost sensor, or one that shows what no hand does, held
+//! (rule 4).
+
+mod back;
 
 use crate::{HoldReason, Instant};
-use glove::hand::{self, Calibration, JOINT_COUNT, SEGMENT_COUNT, Side};
+use back::Back;
+use glove::hand::{self, Calibration, JOINT_COUNT, SEGMENT_COUNT, Side, beyond};
 use glove::scan::{Frame, Health};
 
 /// What a frame says about the hand.
@@ -27,6 +31,11 @@ pub struct Posture {
     known: u32,
     /// Segments whose samples are not used although they look good.
     distrusted: u16,
+    /// Joints that no hand turns so far (bit k: the one between segment k and its parent).
+    beyond: u16,
+    /// Segments whose sensors are to blame for it.
+    impossible: u16,
+    back: Back,
 }
 
 impl Posture {
@@ -38,6 +47,9 @@ impl Posture {
             angles: [0.0; JOINT_COUNT],
             known: 0,
             distrusted: 0,
+            beyond: 0,
+            impossible: 0,
+            back: Back::new(),
         }
     }
 
@@ -74,6 +86,12 @@ impl Posture {
         self.distrusted
     }
 
+    /// Segments whose sensors showed, in the newest frame that could be read, a joint turned farther than a hand's can be (bit k:
+    /// segment k).
+    pub fn impossible(&self) -> u16 {
+        self.impossible
+    }
+
     /// Does not use a segment's samples until the next calibration. Returns whether that is new.
     pub fn distrust(&mut self, segment: usize) -> bool {
         let bit = bit(segment);
@@ -84,51 +102,75 @@ impl Posture {
 
     /// Reads a frame.
     ///
-    /// With one sensor missing (not the `hand`), the joints on both sides of its segment keep their last good angle.
+    /// With one sensor missing or impossible (not the `hand`), the joints on both sides of its segment keep their last good
+    /// angle; when it is back after a while they go gently to what it says.
     ///
     /// # Errors
     /// - `NotCalibrated`: the `hand` sensor or two others have lost their heading since the calibration.
-    /// - `SensorsLost`: the `hand` sensor or two others are missing, or one is and a joint beside it was never measured.
+    /// - `SensorsLost`: the `hand` sensor or two others are missing or impossible, or one is and a joint beside it was never
+    ///   measured.
     /// - `InputRefused`: an angle is not finite, which checked samples cannot give.
     pub fn read(&mut self, frame: &Frame) -> Result<Reading, HoldReason> {
         if self.calibration.is_some() && !self.is_calibrated() {
             return Err(HoldReason::NotCalibrated);
         }
         let missing = missing(frame) | self.distrusted;
-        if missing & 1 != 0 || missing.count_ones() > 1 {
-            return Err(HoldReason::SensorsLost(missing));
-        }
-        let held = if missing == 0 {
-            0
-        } else {
-            hand::joints_of_segment(missing.trailing_zeros() as usize)
-        };
-        if held & !self.known != 0 {
-            return Err(HoldReason::SensorsLost(missing));
-        }
+        self.check(missing)?;
         let orientations = frame.samples.map(|sample| sample.orientation);
         let straight = Calibration::identity();
         let calibration = self.calibration.as_ref().unwrap_or(&straight);
         let measured = hand::joint_angles(&orientations, calibration, self.side);
-        let angles = core::array::from_fn(|joint| {
-            if held & (1 << joint) != 0 {
-                self.angles[joint]
-            } else {
-                measured[joint]
-            }
-        });
+        if self.calibration.is_some() {
+            let excess = beyond::excess(&orientations, calibration, self.side, &measured);
+            self.judge(&excess, missing);
+        }
+        let missing = missing | self.impossible;
+        let held = self.check(missing)?;
+        let stamp = oldest(frame, missing).ok_or(HoldReason::SensorsLost(missing))?;
+        let angles = self.back.blend(stamp, held, &self.angles, &measured);
         if !angles.iter().all(|angle: &f32| angle.is_finite()) {
             return Err(HoldReason::InputRefused);
         }
         self.angles = angles;
         self.known |= !held & hand::joints_of_segment(0);
-        let stamp = oldest(frame, missing).ok_or(HoldReason::SensorsLost(missing))?;
         Ok(Reading {
             angles,
             missing,
             held,
             stamp,
         })
+    }
+
+    /// The joints to hold without these segments' sensors, if it can go on without them.
+    fn check(&self, missing: u16) -> Result<u32, HoldReason> {
+        let held = match missing.count_ones() {
+            0 => 0,
+            1 if missing & 1 == 0 => hand::joints_of_segment(missing.trailing_zeros() as usize),
+            _ => return Err(HoldReason::SensorsLost(missing)),
+        };
+        if held & !self.known != 0 {
+            return Err(HoldReason::SensorsLost(missing));
+        }
+        Ok(held)
+    }
+
+    /// Which sensors show what no hand does, of those that are there.
+    fn judge(&mut self, excess: &[f32; SEGMENT_COUNT], missing: u16) {
+        for (segment, excess) in excess.iter().enumerate() {
+            let parent = hand::parent(segment).unwrap_or(0);
+            let seen = missing & (bit(segment) | bit(parent)) == 0;
+            let limit = if self.beyond & bit(segment) == 0 {
+                beyond::FAR
+            } else {
+                beyond::NEAR
+            };
+            if seen && *excess > limit {
+                self.beyond |= bit(segment);
+            } else {
+                self.beyond &= !bit(segment);
+            }
+        }
+        self.impossible = beyond::to_blame(self.beyond);
     }
 }
 

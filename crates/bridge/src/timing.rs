@@ -40,6 +40,15 @@ pub const ECHO_AFTER: Duration = Duration::from_ticks(1_000_000);
 /// An axis that stands for this long although it is told to move is told of.
 pub const STANDS_AFTER: Duration = Duration::from_ticks(1_500_000);
 
+/// A joint that was held for longer than this, for want of its sensor, goes back to what the sensor says within [`JOINT_BACK`].
+pub const JOINT_AWAY: Duration = Duration::from_ticks(100_000);
+
+/// Time a joint that was held takes from there to what its sensor says, with no jump in speed.
+pub const JOINT_BACK: Duration = Duration::from_ticks(1_000_000);
+
+/// A sensor whose reads do not agree for this long after it was away is told to be lost.
+pub const RETURNING: Duration = Duration::from_ticks(1_000_000);
+
 /// Longest time one step of the loop may take, whatever the devices do.
 pub const STEP_BUDGET: Duration = Duration::from_ticks(1_000);
 

@@ -10,6 +10,7 @@
 
 use nalgebra::UnitQuaternion;
 
+pub mod beyond;
 mod calibration;
 pub mod flat;
 mod rotation;
@@ -192,10 +193,7 @@ pub fn joint_angles(
     calibration: &Calibration,
     side: Side,
 ) -> [f32; JOINT_COUNT] {
-    let mut segments = *orientations;
-    for (sensor, segment) in segments.iter_mut().enumerate() {
-        *segment = calibration.segment_orientation(sensor, segment);
-    }
+    let segments = segments(orientations, calibration);
     let mut angles = [0.0; JOINT_COUNT];
     for finger in 0..5 {
         let joint = first_joint(finger);
@@ -209,6 +207,18 @@ pub fn joint_angles(
         angles[joint + 4] = hinge(&segments[segment + 1], &segments[segment + 2]);
     }
     angles
+}
+
+/// The segments' orientations, from what the sensors on them report.
+fn segments(
+    orientations: &[Quaternion; SEGMENT_COUNT],
+    calibration: &Calibration,
+) -> [Quaternion; SEGMENT_COUNT] {
+    let mut segments = *orientations;
+    for (sensor, segment) in segments.iter_mut().enumerate() {
+        *segment = calibration.segment_orientation(sensor, segment);
+    }
+    segments
 }
 
 /// The angle of a hinge between `parent` and `child`: the twist about x of their relative rotation, in (−π, π].

@@ -104,6 +104,8 @@ pub enum Fault {
     Restarted,
     /// Turned faster than a hand can since the last good sample ([`FASTEST`]).
     TooFast,
+    /// One of the first after a time without samples: several must agree before it is believed.
+    Away,
     /// The same raw bytes for a while, although what it is fixed to turned.
     Frozen,
     /// No bit of any sensor changed for a while, although they flickered before: what answers is not alive.
@@ -119,6 +121,7 @@ impl core::fmt::Display for Fault {
             Fault::NotUnit => "quaternion not of unit length",
             Fault::Restarted => "sensor restarted by itself",
             Fault::TooFast => "turned faster than a hand can",
+            Fault::Away => "back, and not believed before several reads agree",
             Fault::Frozen => "frozen while the hand turned",
             Fault::AllFrozen => "frozen together with all others",
             Fault::Twin => "the same bits as on another channel of the multiplexer",

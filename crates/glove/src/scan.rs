@@ -9,17 +9,20 @@
 //! brought up again between scans, one step a scan, while the others go on.
 
 use crate::bus::Bus;
-use crate::hand::{Quaternion, SEGMENT_COUNT, SEGMENT_NAMES};
+use crate::hand::{Quaternion, SEGMENT_COUNT};
 use crate::sc18im::{self, Sc18im};
 use crate::{Duration, Instant, imu, mux};
 use sensor::Sensor;
 
+mod finding;
 mod frozen;
 mod machine;
 mod sensor;
 mod together;
 mod twins;
 mod unique;
+
+pub use finding::Finding;
 
 /// One sensor's part of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,6 +118,8 @@ pub struct Counters {
     pub restarted: u32,
     /// Samples refused: too fast.
     pub too_fast: u32,
+    /// Samples refused: the first after a time without any.
+    pub away: u32,
     /// Samples refused: frozen, alone or all together.
     pub frozen: u32,
     /// Samples refused: the same bits as on another channel.
@@ -131,66 +136,8 @@ pub struct Counters {
     pub starts: [u16; SEGMENT_COUNT],
 }
 
-/// Something the scanner found out about the sensors, told once when it begins.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Finding {
-    /// This sensor repeats its bytes although it must have turned: it is not used until they change.
-    Frozen {
-        /// Its segment.
-        segment: u8,
-    },
-    /// No bit of any sensor changes any more, although they flickered: none is used until its bytes change.
-    AllFrozen,
-    /// This sensor jumped as no hand does, and stayed there: it is used again, as a new beginning. Its heading, and with it
-    /// the calibration, is doubtful.
-    Jumped {
-        /// Its segment.
-        segment: u8,
-        /// How far, radians.
-        by: f32,
-    },
-    /// These channels of the multiplexer give the same bits (bit n: channel n): their sensors are not used while they do.
-    Twins {
-        /// The channels, two at least.
-        channels: u8,
-    },
-    /// By its unique id another sensor answers than the one of this segment: it is not used.
-    WrongSensor {
-        /// The segment.
-        segment: u8,
-        /// [`imu::Error::SameSensor`] or [`imu::Error::OtherSensor`].
-        error: imu::Error,
-    },
-}
-
 /// Most findings kept for [`BusScanner::next_finding`]; one for every sensor.
 pub const FINDINGS_MAX: usize = SEGMENT_COUNT;
-
-impl core::fmt::Display for Finding {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        let name = |segment: u8| SEGMENT_NAMES.get(usize::from(segment)).unwrap_or(&"?");
-        match *self {
-            Finding::Frozen { segment } => {
-                write!(f, "the sensor on {} is frozen", name(segment))
-            }
-            Finding::AllFrozen => f.write_str("all sensors are frozen: no bit changes any more"),
-            Finding::Jumped { segment, by } => write!(
-                f,
-                "the sensor on {} jumped by {:.0}°, as no hand does, and stayed there",
-                name(segment),
-                by * (180.0 / core::f32::consts::PI)
-            ),
-            Finding::Twins { channels } => {
-                f.write_str("the multiplexer's channels")?;
-                for channel in (0..mux::CHANNELS).filter(|channel| channels >> channel & 1 == 1) {
-                    write!(f, " {channel}")?;
-                }
-                f.write_str(" give the same bits: it does not select")
-            }
-            Finding::WrongSensor { segment, error } => write!(f, "{}: {error}", name(segment)),
-        }
-    }
-}
 
 /// How the glove is wired and run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -237,6 +184,8 @@ pub struct BusScanner<B> {
     job: Option<machine::Job>,
     step: Option<machine::ActiveStep>,
     phase: machine::Phase,
+    /// Stamp of the newest good sample of any sensor.
+    seen: Instant,
     counters: Counters,
 }
 
@@ -288,6 +237,7 @@ impl<B: Bus> BusScanner<B> {
             job: None,
             step: None,
             phase: machine::Phase::Starting,
+            seen: Instant::from_ticks(0),
             counters: Counters::default(),
             config,
         }

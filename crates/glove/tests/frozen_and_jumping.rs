@@ -223,3 +223,63 @@ fn a_sensor_that_is_another_than_at_first_is_named_and_not_used() {
     bench.glove.exchange_sensor(6, 6);
     assert_eq!(bench.for_ms(4_000).last().map(Frame::good), Some(ALL));
 }
+
+/// Off the bus for a while, and back with another heading.
+fn away(bench: &mut Bench, k: usize, ms: u64, turned: f32) {
+    bench.glove.unplug(k, true);
+    bench.for_ms(ms);
+    bench.glove.set_heading(k, turned);
+    bench.glove.unplug(k, false);
+}
+
+#[test]
+fn a_sensor_that_was_away_and_comes_back_far_off_is_believed_after_ten_reads_and_told() {
+    for (degrees, k, ms) in [(90.0f32, 4, 250), (60.0, 9, 400), (170.0, 0, 700)] {
+        let mut bench = Bench::new(|_| [0.1; 25]).up();
+        away(&mut bench, k, ms, degrees.to_radians());
+        let frames = bench.for_ms(1_500);
+        let back = frames
+            .iter()
+            .position(|f| matches!(f.samples[k].health, Health::Rejected(_)));
+        let first = back.unwrap_or_else(|| panic!("{degrees}: believed at once"));
+        let held = frames[first..].iter().take_while(|f| f.good() != ALL);
+        let held = held
+            .inspect(|f| assert!(rejected(f, k, Fault::Away)))
+            .count();
+        assert_eq!(held, 9, "{degrees}: the tenth is believed");
+        let [Finding::Returned { segments, by }] = findings(&mut bench)[..] else {
+            panic!("{degrees}: not told")
+        };
+        assert_eq!(segments, 1 << k);
+        assert!((by.to_degrees() - degrees).abs() < 1.0, "{by}");
+    }
+}
+
+#[test]
+fn a_sensor_that_was_away_and_comes_back_where_it_was_is_believed_at_once_and_not_told() {
+    let mut bench = Bench::new(waving).up();
+    for round in 0..20 {
+        // Near a turning point of the motion nothing goes far.
+        away(&mut bench, 9, 210, 0.0);
+        let frames = bench.for_ms(700);
+        assert_eq!(frames.last().unwrap().good(), ALL, "{round}");
+        let told = findings(&mut bench);
+        let far = |f: &Finding| matches!(f, Finding::Returned { by, .. } if *by > 0.78);
+        assert!(told.iter().all(far), "{told:?}");
+    }
+}
+
+#[test]
+fn a_sensor_that_comes_back_to_and_fro_is_never_believed() {
+    let mut bench = Bench::new(|_| [0.1; 25]).up();
+    let before = bench.for_ms(200).last().unwrap().samples[9].orientation;
+    away(&mut bench, 9, 300, 1.6);
+    for round in 0..40 {
+        bench.glove.set_heading(9, [2.5, -2.0, 1.6][round % 3]);
+        for frame in bench.for_ms(120) {
+            let off = imu::angle_between(&frame.samples[9].orientation, &before);
+            assert!(off < 0.01, "{round}: off by {off}");
+        }
+    }
+    assert_eq!(findings(&mut bench), []);
+}

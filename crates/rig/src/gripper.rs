@@ -96,6 +96,9 @@ impl Config {
     }
 }
 
+/// Changes a status block, at this time, to what the gripper says.
+pub type Liar = Box<dyn FnMut(Instant, &mut [u8; 16]) + Send>;
+
 /// The gripper. Clones share one: keep one to look at its true state and to put faults on it.
 ///
 /// A one-axis gripper's axis is number 0; the other three read 0. Positions are those of the last
@@ -260,6 +263,23 @@ impl VirtualGripper {
         let mut server = self.server();
         server.lies.contact = contact.map(|bits| bits & 3);
         server.show_status();
+    }
+
+    /// Lets `liar` change the status block each time it is read, before it gets its (right) check sum; or be true again.
+    pub fn set_liar(&self, liar: Option<Liar>) {
+        self.server().liar = liar;
+    }
+
+    /// Writes `bytes` into the command block from `first` on, as another master on the line does.
+    pub fn overwrite_command(&self, first: usize, bytes: &[u8]) {
+        let mut server = self.server();
+        let place = server.command.iter_mut().skip(first);
+        place.zip(bytes).for_each(|(place, byte)| *place = *byte);
+    }
+
+    /// Switches its power off, in whatever it is doing, or on again: it stands where it stood, and has to be activated.
+    pub fn power(&self, on: bool) {
+        self.server().power(on);
     }
 
     /// Stops the motor of axis `index` for good, or lets it turn again; its contact stays as it was.

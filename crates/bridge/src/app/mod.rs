@@ -81,6 +81,8 @@ struct Sensors {
     good: [Option<Instant>; SEGMENT_COUNT],
     /// Told to be lost (bit k: segment k).
     lost: u16,
+    /// Told to show what no hand does.
+    impossible: u16,
     /// How often each had been started when the calibration was made; `None` without one.
     starts: Option<[u16; SEGMENT_COUNT]>,
 }

@@ -6,10 +6,11 @@ use crate::platform::{Platform, Slot};
 use crate::posture;
 use crate::supervisor::{Hand, Inputs, Output, State, Weights};
 use crate::telemetry::{Sent, bump};
-use crate::{HIDDEN, HoldReason, Instant, timing};
+use crate::{Duration, HIDDEN, HoldReason, Instant, timing};
 use embedded_io::{Read, ReadReady, Write};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::{Finding, Frame};
+use glove::imu;
+use glove::scan::{Finding, Frame, Health};
 use gripper::registers::Fault;
 use gripper::{Gripper, Status};
 
@@ -66,12 +67,17 @@ where
             self.telemetry.glove_answers = true;
             self.tell(now, Kind::Glove { answers: true });
         }
-        self.frame_at = Some(now);
+        let before = self.frame_at.replace(now);
+        if !before.is_some_and(|before| timing::is_fresh(now, before)) {
+            // There was none of any sensor: each has its time from now on.
+            self.sensors.good = [Some(now); SEGMENT_COUNT];
+        }
         self.telemetry.take_frame(frame);
         self.watch_sensors(now, frame);
         self.tell_findings(now);
         self.try_calibration(now, frame);
         let reading = self.posture.read(frame);
+        self.tell_impossible(now);
         self.telemetry.take_reading(&reading);
         let output = reading.and_then(|reading| {
             let map = self
@@ -108,7 +114,9 @@ where
                     self.sensors.lost &= !bit;
                     self.tell(now, Kind::SensorBack { segment });
                 }
-            } else if self.sensors.lost & bit == 0 && !timing::is_fresh(now, *seen) {
+            } else if self.sensors.lost & bit == 0
+                && !timing::is_within(now, *seen, patience(frame, segment))
+            {
                 self.sensors.lost |= bit;
                 self.tell(now, Kind::SensorLost { segment });
             }
@@ -133,6 +141,24 @@ where
                 self.posture.distrust(usize::from(segment));
             }
             self.tell(now, Kind::Sensors(finding));
+        }
+    }
+
+    /// Tells which sensors show what no hand does, and which no longer do.
+    fn tell_impossible(&mut self, now: Instant) {
+        let (before, impossible) = (self.sensors.impossible, self.posture.impossible());
+        self.sensors.impossible = impossible;
+        for segment in (0..SEGMENT_COUNT).filter(|k| (before ^ impossible) >> k & 1 == 1) {
+            self.tell(
+                now,
+                if impossible >> segment & 1 == 1 {
+                    Kind::Sensors(Finding::Impossible {
+                        segment: segment as u8,
+                    })
+                } else {
+                    Kind::SensorBack { segment }
+                },
+            );
         }
     }
 
@@ -276,6 +302,15 @@ where
             let _ = self.events.push_back(event);
             bump(&mut self.telemetry.counters.events_lost);
         }
+    }
+}
+
+/// How long a sensor may give nothing that is used before it is told to be lost. One that is back has some reads that must
+/// agree before it.
+fn patience(frame: &Frame, segment: usize) -> Duration {
+    match frame.samples.get(segment).map(|sample| sample.health) {
+        Some(Health::Rejected(imu::Fault::Away)) => timing::RETURNING,
+        _ => timing::MAX_AGE,
     }
 }
 

@@ -23,7 +23,7 @@ impl<const X: usize> Supervisor<X> {
         if self.state.is_moving() {
             return match used {
                 Some(used) => (
-                    Some(self.follow(now, gap, status, &used)),
+                    self.follow(now, gap, status, &used),
                     used.stamp.min(status.stamp),
                 ),
                 None => (None, now),
@@ -32,6 +32,7 @@ impl<const X: usize> Supervisor<X> {
         if !obeys(status) {
             self.held = None;
             self.grip = None;
+            self.told.forget();
             return (None, now);
         }
         let opening = self.moved && self.config.settings().safe_action == SafeAction::OpenSlowly;
@@ -53,16 +54,17 @@ impl<const X: usize> Supervisor<X> {
         gap: Duration,
         status: &Status<X>,
         used: &Used<X>,
-    ) -> Motion<X> {
+    ) -> Option<Motion<X>> {
         if now == self.blend.since {
-            return self.command(status.hold());
+            let place = self.told.place(status);
+            return place.is_sure.then(|| self.command(place.position));
         }
         let share = smooth(seconds(since(now, self.blend.since)) / seconds(self.blend_time()));
         let desired = core::array::from_fn(|axis| {
             let from = self.blend.from[axis];
             from + share * (used.target[axis] - from)
         });
-        self.approach(&desired, self.config.settings().rate, gap, status)
+        Some(self.approach(&desired, self.config.settings().rate, gap, status))
     }
 
     /// The next command of [`SafeAction::OpenSlowly`]: the fingers open, the scissor of a 3-Finger gripper stays.
@@ -70,7 +72,7 @@ impl<const X: usize> Supervisor<X> {
         let from = match self.held {
             Some(held) => held,
             None => {
-                let here = status.hold();
+                let here = self.told.place(status).position;
                 self.position = here.map(f32::from);
                 self.held = Some(here);
                 here
@@ -126,17 +128,16 @@ impl<const X: usize> Supervisor<X> {
             self.held = None;
             return None;
         }
+        let place = self.told.place(status);
+        if !place.is_sure {
+            // It repeats what it was not told: what it was told last stays.
+            self.held = None;
+            return None;
+        }
         let lead = self.config.settings().lead;
-        // An echo that is not ours is no grip of ours, and nothing to repeat.
-        let echo_lies = self.echo_lies;
-        let here = if echo_lies {
-            status.position
-        } else {
-            status.hold()
-        };
-        let held = self.held.unwrap_or(here);
+        let held = self.held.unwrap_or(place.position);
         let held = core::array::from_fn(|axis| {
-            if limits::touches(status.contact[axis]) && !echo_lies {
+            if limits::touches(status.contact[axis]) {
                 return status.echo[axis];
             }
             let here = status.position[axis];

@@ -8,6 +8,7 @@ mod command;
 mod hand;
 pub mod limits;
 pub mod state;
+mod told;
 mod underway;
 
 pub use hand::Hand;
@@ -20,6 +21,7 @@ use believed::Believed;
 use gripper::registers::Fault;
 use gripper::{Activation, Motion, Status};
 use hand::{Follower, Used};
+use told::Told;
 use underway::Underway;
 
 /// Whether there is a map to follow.
@@ -83,14 +85,9 @@ pub struct Supervisor<const X: usize> {
     held_since: Option<Instant>,
     blend: Blend<X>,
     underway: Underway<X>,
+    told: Told<X>,
     believed: Believed<X>,
     was_ready: bool,
-    /// Its positions cannot be true, and nobody has closed the clutch since.
-    lies: bool,
-    /// Its echo was not what it was told, and no motion has begun since.
-    echo_lies: bool,
-    /// What the gripper echoes is not what it is told.
-    ignored: bool,
     ignored_since: Option<Instant>,
 }
 
@@ -137,11 +134,9 @@ impl<const X: usize> Supervisor<X> {
                 since: Instant::from_ticks(0),
             },
             underway: Underway::new(),
+            told: Told::new(),
             believed: Believed::new(),
             was_ready: false,
-            lies: false,
-            echo_lies: false,
-            ignored: false,
             ignored_since: None,
         }
     }
@@ -173,21 +168,15 @@ impl<const X: usize> Supervisor<X> {
         if let Some(hand) = &inputs.hand {
             self.follower.accept(now, hand);
         }
-        if self.lies && self.state == State::Idle && inputs.clutch.position(now) == Position::Closed
-        {
-            // A person looked, and closes the clutch again: what was doubted is looked at anew.
-            self.lies = false;
-            self.believed.forget();
+        if self.state == State::Idle && inputs.clutch.position(now) == Position::Closed {
+            self.believed.look_anew();
         }
         let fresh = |status: &Status<X>| timing::is_fresh(now, status.stamp);
         let said = inputs.status.filter(fresh);
         let judged = said.map(|status| self.believed.take(now, &status));
         let implausible = judged.and_then(|judged| judged.implausible);
-        self.lies |= implausible.is_some();
         // Of a gripper that lies nothing is a place to hold: what it was told last stays, and nothing is written.
-        let status = judged
-            .and_then(|judged| judged.status)
-            .filter(|status| fresh(status) && !self.lies);
+        let status = judged.and_then(|judged| judged.status).filter(fresh);
         let gripper = Said {
             status: said,
             implausible,
@@ -197,7 +186,6 @@ impl<const X: usize> Supervisor<X> {
         let before = self.state;
         self.state = state::next(before, &conditions);
         self.enter(now, before, status.as_ref());
-        self.echo_lies |= self.state == State::Faulted(GripperFault::CommandIgnored);
         let (motion, stamp) = self.motion(
             now,
             gap.unwrap_or(Duration::from_ticks(0)),
@@ -206,6 +194,8 @@ impl<const X: usize> Supervisor<X> {
         );
         if let Some(motion) = &motion {
             self.underway.decided(now, motion.position);
+            self.told.note(motion.position);
+            self.believed.told(motion.position);
         }
         Output {
             state: self.state,
@@ -290,24 +280,24 @@ impl<const X: usize> Supervisor<X> {
             let start = *self.ignored_since.get_or_insert(now);
             (since(now, start) >= timing::IGNORED_AFTER).then_some(GripperFault::CommandIgnored)
         } else {
-            self.ignored.then_some(GripperFault::CommandIgnored)
+            self.believed
+                .ignores(now)
+                .then_some(GripperFault::CommandIgnored)
         }
     }
 
-    /// Looks whether the gripper does what it is told: the axis that stands, and for the next step whether it echoes.
+    /// Looks whether the gripper does what it is told: the axis that stands.
     fn stands(
         &mut self,
         now: Instant,
         status: Option<&Status<X>>,
         motion: Option<&Motion<X>>,
     ) -> Option<u8> {
-        self.ignored = false;
         let (Some(status), Some(motion), true) = (status, motion, self.state.is_moving()) else {
             self.believed.rest();
             return None;
         };
         self.believed.follow(now, status, motion);
-        self.ignored = self.believed.ignores(now);
         self.believed.stands(now, status)
     }
 
@@ -336,14 +326,13 @@ impl<const X: usize> Supervisor<X> {
     /// Following begins where the gripper is.
     fn begin(&mut self, now: Instant, status: Option<&Status<X>>) {
         if let Some(status) = status {
-            self.position = status.hold().map(f32::from);
+            self.position = self.told.place(status).position.map(f32::from);
         }
         self.blend = Blend {
             from: self.position,
             since: now,
         };
         self.moved = true;
-        self.echo_lies = false;
         self.held_since = None;
         self.ignored_since = None;
     }

@@ -61,7 +61,8 @@ pub enum GripperFault {
     /// It answers commands and does not go to them: gGTO stays 0 for 500 ms, or what it echoes is not what it was told
     /// for 1 s.
     CommandIgnored,
-    /// What it says of where it is cannot be: an axis jumped farther than it can move, several times in a row.
+    /// What it says of where it is cannot be: an axis jumped farther than it can move, several times in a row, or was found
+    /// elsewhere than it was left.
     Implausible {
         /// The axis.
         axis: u8,
@@ -159,7 +160,7 @@ impl core::fmt::Display for GripperFault {
             }
             GripperFault::Implausible { axis } => write!(
                 f,
-                "the gripper says that {} jumped farther than it can move",
+                "the gripper says that {} is where it cannot have come: look at it, open the clutch; if it stays so, activate it anew",
                 crate::telemetry::axis_name(*axis)
             ),
             GripperFault::CommandIgnored => f.write_str("the gripper does not go to its commands"),

@@ -79,6 +79,16 @@ impl Bench {
         image: Option<Vec<u8>>,
         config: rig::gripper::Config,
     ) -> Self {
+        Self::on(settings, image, config, gripper::driver::Config::default())
+    }
+
+    /// With a gripper's driver of this kind.
+    pub fn on(
+        settings: Settings<4>,
+        image: Option<Vec<u8>>,
+        config: rig::gripper::Config,
+        driver: gripper::driver::Config,
+    ) -> Self {
         let clock = Clock::new();
         let pose = Arc::new(Mutex::new([0.0; 25]));
         let glove = VirtualGlove::new(
@@ -99,7 +109,7 @@ impl Bench {
         let app = App::new(
             Virtual(clock.clone()),
             glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
-            ThreeFinger::new(gripper_wire.clone(), gripper::driver::Config::default()),
+            ThreeFinger::new(gripper_wire.clone(), driver),
             store,
             Config::new(settings).expect("in range"),
         );

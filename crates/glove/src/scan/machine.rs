@@ -4,7 +4,7 @@ use super::{BusScanner, Frame};
 use crate::bus::{Batch, Bus, Error, Reply, Transaction};
 use crate::imu::bringup::{BringUp, Next};
 use crate::imu::{self, SAMPLE_BYTES, register};
-use crate::timing::after;
+use crate::timing::{self, after, since};
 use crate::{Instant, scan::sensor::Sensor};
 
 /// What is under way on the bus.
@@ -129,11 +129,21 @@ impl<B: Bus> BusScanner<B> {
     /// a whole, since the samples it has are as old; a step makes its transaction again by itself.
     fn ask_again(&mut self, job: Job, now: Instant) {
         if let (Job::Sample { .. }, Phase::Reading { .. }) = (job, self.phase) {
-            self.phase = Phase::Reading {
-                next: 0,
-                began: now,
-            };
+            self.begin_reading(now);
         }
+    }
+
+    fn begin_reading(&mut self, now: Instant) {
+        if since(now, self.seen) >= timing::PEAK_SPEED {
+            let then = self.seen;
+            self.sensors
+                .iter_mut()
+                .for_each(|sensor| sensor.not_seen_since(then));
+        }
+        self.phase = Phase::Reading {
+            next: 0,
+            began: now,
+        };
     }
 
     fn take_sample(
@@ -157,7 +167,12 @@ impl<B: Bus> BusScanner<B> {
             return;
         };
         match sample {
-            Ok(raw) => sensor.take(raw, stamp, &mut self.counters),
+            Ok(raw) => {
+                sensor.take(raw, stamp, &mut self.counters);
+                if sensor.health.is_good() {
+                    self.seen = stamp;
+                }
+            }
             Err(cause) => sensor.miss(cause, now, &mut self.counters),
         }
     }
@@ -326,10 +341,7 @@ impl<B: Bus> BusScanner<B> {
             };
             return false;
         }
-        self.phase = Phase::Reading {
-            next: 0,
-            began: now,
-        };
+        self.begin_reading(now);
         true
     }
 

@@ -21,11 +21,21 @@ const AGREEING: u8 = 10;
 /// 1,600 °/s turns as far in a scan.
 const AGREE_WITHIN: f32 = core::f32::consts::FRAC_PI_4;
 
-/// A sensor that jumped as no hand does: what it has read since.
+/// A sensor that jumped as no hand does, or was away: what it has read since.
 #[derive(Debug, Clone, Copy)]
 struct Suspect {
     read: Quaternion,
     agreeing: u8,
+    was_away: bool,
+}
+
+/// What is told of a sensor that is believed again far from where it was.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Return {
+    /// How far off, radians.
+    pub by: f32,
+    /// It gave no samples in between: a hand can have turned so far.
+    pub was_away: bool,
 }
 
 /// One sensor.
@@ -47,9 +57,11 @@ pub(super) struct Sensor {
     pub distrusted: Option<([u8; imu::SAMPLE_BYTES], Fault)>,
     /// Another channel gives the same bits as this one's.
     pub is_twin: bool,
-    /// How far it jumped, radians, when it has just been believed again after a jump that stayed.
-    pub jumped: Option<f32>,
+    /// It has just been believed again, far from where it was.
+    pub returned: Option<Return>,
     good: Option<(Quaternion, Instant)>,
+    /// Nobody looked at any sensor for a while, and until then it was good: it was not away.
+    unseen: bool,
     suspect: Option<Suspect>,
     /// Good samples since it came up.
     fresh: bool,
@@ -72,8 +84,9 @@ impl Sensor {
             tried: false,
             distrusted: None,
             is_twin: false,
-            jumped: None,
+            returned: None,
             good: None,
+            unseen: false,
             suspect: None,
             fresh: false,
             up_since: Instant::from_ticks(0),
@@ -121,7 +134,7 @@ impl Sensor {
                     None => orientation,
                 };
                 self.good = Some((orientation, stamp));
-                self.fresh = true;
+                (self.fresh, self.unseen) = (true, false);
                 self.distrusted = None;
                 self.health = Health::Good;
                 (self.bad, self.rechecks, self.failures, self.tries) = (0, 0, 0, 0);
@@ -129,6 +142,13 @@ impl Sensor {
             }
             Err(fault) => self.reject(fault, stamp, counters),
         }
+    }
+
+    /// No sensor gave a sample from `then` until now.
+    pub fn not_seen_since(&mut self, then: Instant) {
+        self.unseen = self
+            .good
+            .is_some_and(|(_, at)| since(then, at) < timing::PEAK_SPEED);
     }
 
     fn judge(
@@ -145,18 +165,30 @@ impl Sensor {
         if self.is_twin {
             return Err(Fault::Twin);
         }
-        let Some((good, at)) = self.good.filter(|_| self.fresh) else {
+        let Some((good, at)) = self.good else {
             self.suspect = None;
             return Ok(orientation);
         };
+        let by = imu::angle_between(&good, &orientation);
+        let elapsed = since(stamp, at);
+        if self.unseen && self.suspect.is_none() {
+            // The hand may have done anything meanwhile.
+            return Ok(orientation);
+        }
+        let was_away = !self.fresh || elapsed >= timing::PEAK_SPEED;
         let Some(suspect) = self.suspect else {
-            if imu::is_reachable(&good, &orientation, since(stamp, at)) {
+            let is_near = if was_away {
+                by <= AGREE_WITHIN
+            } else {
+                imu::is_reachable(&good, &orientation, elapsed)
+            };
+            if is_near {
                 return Ok(orientation);
             }
-            self.suspect = Some(Suspect::at(orientation));
-            return Err(Fault::TooFast);
+            let suspect = Suspect::at(orientation, was_away);
+            self.suspect = Some(suspect);
+            return Err(suspect.fault());
         };
-        let by = imu::angle_between(&good, &orientation);
         if by <= AGREE_WITHIN {
             // A spike, and it is over.
             self.suspect = None;
@@ -165,9 +197,11 @@ impl Sensor {
         let next = suspect.followed_by(orientation);
         self.suspect = Some(next);
         if next.agreeing < AGREEING {
-            return Err(Fault::TooFast);
+            return Err(next.fault());
         }
-        (self.suspect, self.jumped) = (None, Some(by));
+        self.suspect = None;
+        let was_away = next.was_away;
+        self.returned = Some(Return { by, was_away });
         Ok(orientation)
     }
 
@@ -180,7 +214,7 @@ impl Sensor {
         self.health = Health::Rejected(fault);
         match fault {
             // Right bytes of the right register, only not to be believed: time mends these.
-            Fault::TooFast | Fault::AllFrozen | Fault::Twin => return,
+            Fault::TooFast | Fault::Away | Fault::AllFrozen | Fault::Twin => return,
             Fault::Frozen => {
                 if since(now, self.up_since) >= timing::FROZEN_RESTART {
                     self.restart(Error::Rejected(fault), now);
@@ -282,7 +316,7 @@ impl Sensor {
         self.pointer_stays = outcome.pointer_stays.unwrap_or(self.pointer_stays);
         if step == Step::Recheck && outcome.next.is_some() {
             // Its fusion has started anew, so the next orientation has nothing to do with the last.
-            self.fresh = false;
+            (self.fresh, self.suspect) = (false, None);
         }
         if outcome.next.is_some() {
             return false;
@@ -291,7 +325,7 @@ impl Sensor {
         if step == Step::Recheck {
             return false;
         }
-        self.fresh = false;
+        (self.fresh, self.suspect) = (false, None);
         self.up_since = now;
         self.health = Health::Starting;
         true
@@ -327,18 +361,31 @@ impl Sensor {
 }
 
 impl Suspect {
-    fn at(read: Quaternion) -> Self {
-        Self { read, agreeing: 1 }
+    fn at(read: Quaternion, was_away: bool) -> Self {
+        Self {
+            read,
+            agreeing: 1,
+            was_away,
+        }
+    }
+
+    fn fault(&self) -> Fault {
+        if self.was_away {
+            Fault::Away
+        } else {
+            Fault::TooFast
+        }
     }
 
     /// One more read: it agrees with the one before, or the count begins anew.
     fn followed_by(self, read: Quaternion) -> Self {
         if imu::angle_between(&self.read, &read) > AGREE_WITHIN {
-            return Self::at(read);
+            return Self::at(read, self.was_away);
         }
         Self {
             read,
             agreeing: self.agreeing.saturating_add(1),
+            ..self
         }
     }
 }
@@ -357,6 +404,7 @@ fn count(fault: Fault, counters: &mut Counters) {
         Fault::NotUnit => &mut counters.not_unit,
         Fault::Restarted => &mut counters.restarted,
         Fault::TooFast => &mut counters.too_fast,
+        Fault::Away => &mut counters.away,
         Fault::Frozen | Fault::AllFrozen => &mut counters.frozen,
         Fault::Twin => &mut counters.twins,
     };

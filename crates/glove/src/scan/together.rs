@@ -1,5 +1,6 @@
 //! What only the sensors together tell, at the end of each scan, and what of it is worth telling a person.
 
+use super::sensor::Return;
 use super::{BusScanner, FINDINGS_MAX, Finding};
 use crate::Instant;
 use crate::imu::Fault;
@@ -31,13 +32,35 @@ impl<B> BusScanner<B> {
             } else if alone && sensor.withdraw(Fault::Frozen, now, &mut self.counters) {
                 self.tell(Finding::Frozen { segment: k as u8 });
             }
-            if let Some(by) = self.sensors.get_mut(k).and_then(|s| s.jumped.take()) {
+        }
+        self.tell_returns();
+    }
+
+    /// Those that jumped are told one by one; those that were away together.
+    fn tell_returns(&mut self) {
+        let (mut segments, mut farthest) = (0, 0.0);
+        for k in 0..self.sensors.len() {
+            let Some(Return { by, was_away }) =
+                self.sensors.get_mut(k).and_then(|s| s.returned.take())
+            else {
+                continue;
+            };
+            if was_away {
+                segments |= 1 << k;
+                farthest = if by > farthest { by } else { farthest };
+            } else {
                 self.counters.jumps = self.counters.jumps.wrapping_add(1);
                 self.tell(Finding::Jumped {
                     segment: k as u8,
                     by,
                 });
             }
+        }
+        if segments != 0 {
+            self.tell(Finding::Returned {
+                segments,
+                by: farthest,
+            });
         }
     }
 

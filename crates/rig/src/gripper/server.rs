@@ -48,6 +48,9 @@ pub(super) struct Server {
     pub mute: u32,
     pub reply_delay: Duration,
     pub lies: Lies,
+    pub liar: Option<super::Liar>,
+    /// Without power: silent, deaf, and nothing moves.
+    pub off: bool,
 }
 
 /// What the status says that is not so.
@@ -120,6 +123,8 @@ impl Server {
             mute: 0,
             reply_delay: Duration::from_ticks(0),
             lies: Lies::default(),
+            liar: None,
+            off: false,
         };
         server.show_status();
         server
@@ -127,6 +132,9 @@ impl Server {
 
     /// Refreshes the registers every 5 ms up to `now`.
     pub fn run_until(&mut self, now: Instant) {
+        if self.off {
+            self.refreshed = now;
+        }
         let behind = now
             .checked_duration_since(self.refreshed)
             .map_or(0, |d| d.as_ticks());
@@ -272,12 +280,15 @@ impl Server {
         response.emit_pdu(out).ok()
     }
 
-    fn read(&self, address: u16, quantity: u16) -> Option<Vec<u8>> {
-        let block = if address >= STATUS {
-            &self.status
+    fn read(&mut self, address: u16, quantity: u16) -> Option<Vec<u8>> {
+        let mut block = if address >= STATUS {
+            self.status
         } else {
-            &self.command
+            self.command
         };
+        if let Some(liar) = self.liar.as_mut().filter(|_| address >= STATUS) {
+            liar(self.refreshed, &mut block);
+        }
         let first = if address >= STATUS { STATUS } else { COMMAND };
         let from = 2 * usize::from(address.checked_sub(first)?);
         let to = from + 2 * usize::from(quantity);
@@ -295,8 +306,30 @@ impl Server {
         Some(())
     }
 
+    /// Switches its power off, or on again: it stands where it stood, has to be activated, and knows no command.
+    pub fn power(&mut self, on: bool) {
+        self.off = !on;
+        self.received.clear();
+        self.reply.clear();
+        self.command = [0; 16];
+        self.model = match &self.model {
+            Model::Three(three) => Model::Three(ThreeFinger::new(core::array::from_fn(|k| {
+                three.axes[k].position
+            }))),
+            Model::Two(two) => {
+                let traits = self.config.family.traits();
+                let new = |traits| Model::Two(TwoFinger::new(two.axis.position, traits));
+                traits.map_or_else(|| self.model.clone(), new)
+            }
+        };
+        self.show_status();
+    }
+
     /// A byte on the RTU line.
     pub fn receive(&mut self, byte: u8, now: Instant) {
+        if self.off {
+            return;
+        }
         if self.frame_due().is_some_and(|due| due <= now) {
             self.end_frame(now);
         }

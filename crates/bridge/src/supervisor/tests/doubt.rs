@@ -218,3 +218,94 @@ fn an_echo_that_is_not_ours_is_not_what_a_hold_repeats() {
     }
     assert_eq!(bench.supervisor.state(), State::Idle);
 }
+
+/// Opens the clutch, and closes it again, while positions come as `lies` makes them.
+fn reclose(
+    bench: &mut Bench,
+    lies: impl Fn(usize, [u8; 4]) -> [u8; 4],
+    steps: usize,
+) -> Vec<Output<4>> {
+    bench.inputs.clutch = Clutch::Open;
+    bench.now += 10 * MS;
+    bench.supervisor.step(at(bench.now), &bench.inputs);
+    lie(bench, lies, steps)
+}
+
+#[test]
+fn positions_that_were_not_true_are_not_believed_for_being_said_again_after_the_next_closing() {
+    let mut bench = following();
+    bench.ticks(300);
+    let told = bench.status().echo;
+    let off = |_: usize, truth: [u8; 4]| truth.map(|x| if x > 127 { x - 100 } else { x + 100 });
+    lie(&mut bench, off, 20);
+    for _ in 0..3 {
+        let outputs = reclose(&mut bench, off, 100);
+        assert!(farthest(&outputs, told) <= 2, "{outputs:?}");
+        assert!(matches!(
+            outputs[99].state,
+            State::Faulted(GripperFault::Implausible { .. })
+        ));
+    }
+    // An activation finds the stops: its positions count anew.
+    bench.status().activation = Activation::Activating;
+    let off = |_: usize, truth: [u8; 4]| truth.map(|x| x.saturating_add(50));
+    reclose(&mut bench, off, 5);
+    bench.status().activation = Activation::Ready;
+    let outputs = reclose(&mut bench, off, 200);
+    assert!(outputs[199].state.is_moving(), "{:?}", outputs[199].state);
+}
+
+#[test]
+fn a_gripper_found_elsewhere_after_a_silence_waits_for_a_person() {
+    for (moved, waits) in [(100, true), (15, false)] {
+        let mut bench = following();
+        bench.ticks(300);
+        bench.answering = false;
+        bench.ticks(70);
+        bench.answering = true;
+        bench.status().position[1] -= moved;
+        bench.status().echo = bench.inputs.status.unwrap().position;
+        let sent = bench.sent.len();
+        bench.ticks(200);
+        if !waits {
+            assert_eq!(bench.supervisor.state(), State::Following);
+            continue;
+        }
+        assert_eq!(
+            bench.supervisor.state(),
+            State::Faulted(GripperFault::Implausible { axis: 1 })
+        );
+        assert_eq!(bench.sent.len(), sent, "nothing is written");
+        // A person looked, opens and closes: it follows from there.
+        bench.beating = false;
+        bench.inputs.clutch = Clutch::Open;
+        bench.ticks(5);
+        bench.beating = true;
+        bench.until(|state| state == State::Following);
+    }
+}
+
+#[test]
+fn an_echo_in_contact_that_it_was_never_told_is_repeated_by_no_hold_from_the_first_moment_on() {
+    for lasts in 1..20 {
+        let mut bench = following();
+        bench.ticks(300);
+        let here = bench.status().position;
+        for step in 0..lasts + 100 {
+            bench.now += 10 * MS;
+            let now = bench.now;
+            let status = bench.status();
+            status.stamp = at(now);
+            (status.echo, status.contact) = ([255; 4], [Contact::ContactClosing; 4]);
+            bench.frame(Ok(bench.output), now - 5 * MS);
+            // A person opens it, and closes it again.
+            bench.inputs.clutch = if (lasts..lasts + 30).contains(&step) {
+                Clutch::Open
+            } else {
+                closed(at(now))
+            };
+            let output = bench.supervisor.step(at(now), &bench.inputs);
+            assert!(farthest(&[output], here) <= 40, "{lasts}: {output:?}");
+        }
+    }
+}
