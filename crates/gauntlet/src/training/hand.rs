@@ -9,11 +9,12 @@ use gripper::space;
 use trainer::algorithm::{PairPlan, Schedule};
 use trainer::cost::Lambda;
 use trainer::data::{Columns, Matrix, Pairs, Table, split};
+use trainer::hand::table3;
+use trainer::hand::{Scripted, start_pairs};
 use trainer::measures::NEIGHBOURS;
 use trainer::model::{Model, Normalisation};
-use trainer::operator::{Operator, Scripted, start_pairs};
+use trainer::operator::Operator;
 use trainer::spread::spread;
-use trainer::table3;
 
 use super::domains::first;
 use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};

@@ -221,21 +221,6 @@ impl Plan {
             ..self
         }
     }
-
-    /// All its numbers, fit for a file's name.
-    pub(crate) fn slug(&self) -> String {
-        format!(
-            "{}x{}-{}x{}-{}-{}-{}-{}",
-            self.stage_epochs,
-            self.last_epochs,
-            self.stage_rate,
-            self.rate.initial,
-            self.ramp_start,
-            self.ramp_epochs,
-            self.cooling_epochs,
-            self.batches
-        )
-    }
 }
 
 #[cfg(test)]

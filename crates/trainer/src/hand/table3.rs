@@ -53,7 +53,7 @@ pub fn pairs(operator: &mut dyn Operator, count: usize) -> Result<Pairs, Error> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::operator::Scripted;
+    use crate::hand::Scripted;
 
     #[test]
     fn every_pose_can_be_taken_by_the_gripper_and_shown_by_the_hand() {

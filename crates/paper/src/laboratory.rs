@@ -1,20 +1,21 @@
 //! Makes the samples of a cell, trains, measures.
 
 use super::{Cell, Error, Row, Source};
-use crate::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
-use crate::cost::Lambda;
-use crate::data::{self, Matrix, Pairs};
-use crate::measures::{Coverage, Measures, Test, measure};
-use crate::model::{Metadata, Model, Normalisation};
-use crate::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
-use crate::network::Network;
-use crate::operator::{GroundTruth, Operator, Scripted};
-use crate::random::Random;
 use crate::shapes::{Domains, ShapePair, Singular};
-use crate::table3;
 use core::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::time::Instant;
+use trainer::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
+use trainer::cost::Lambda;
+use trainer::data::{self, Matrix, Pairs};
+use trainer::hand::Scripted;
+use trainer::hand::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
+use trainer::hand::table3;
+use trainer::measures::{Coverage, Measures, Test, measure};
+use trainer::model::{Metadata, Model, Normalisation};
+use trainer::network::Network;
+use trainer::operator::{GroundTruth, Operator};
+use trainer::random::Random;
 
 /// Target samples of every experiment (§3.2.1, §3.3.2).
 const TARGETS: usize = 8000;

@@ -3,10 +3,10 @@
 //! gathered pinch a high one.
 
 use super::person::Person;
-use super::{Error, Operator, check};
 use crate::data::Matrix;
-use crate::motion::joints::COUNT;
-use crate::motion::{Posture, within};
+use crate::hand::motion::joints::COUNT;
+use crate::hand::motion::{Posture, within};
+use crate::operator::{Error, Operator, check};
 
 /// Counts of a closed finger, and of the scissor in a pinch.
 const FULL: f32 = 255.0;
@@ -83,9 +83,9 @@ fn posture_for([a, b, c, scissor]: [f32; 4]) -> Posture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Generator;
-    use crate::motion::joints::{Finger, THUMB_MCP_FLEX};
-    use crate::operator::{FIST, OPEN_HAND};
+    use crate::hand::motion::Generator;
+    use crate::hand::motion::joints::{Finger, THUMB_MCP_FLEX};
+    use crate::hand::{FIST, OPEN_HAND};
 
     const LIMITS: [(f32, f32); COUNT] = glove::hand::LIMITS;
 

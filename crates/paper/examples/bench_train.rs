@@ -1,6 +1,6 @@
 //! Measures training: time a step and a model, quality by data set and schedule.
 //!
-//! `cargo run --release -p trainer --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
+//! `cargo run --release -p paper --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
 //! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
 //! differs from the fast one on a plane (`m1`, `m2`, `stage_rate`, `rate`, `decay`, `start`, `ramp`, `cool`, `batches`; see
 //! `trainer::algorithm::Plan`); seeds: `5`, or `6-10`; then threads, and the deviation of initial weights that are normally distributed.
@@ -8,8 +8,10 @@
 //! `-- speed 2` prints the table of times a step on two threads, with the phases of a step and
 //! how it grows. Without a word it prints all there is about speed, and draws the growth into `target/bench-train`.
 
+use charts::{Chart, Curve};
 use core::ops::ControlFlow;
 use core::ops::RangeInclusive;
+use paper::shapes::ShapePair;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -19,13 +21,12 @@ use trainer::cost::fast::Steps;
 use trainer::cost::reference::Autoencoder;
 use trainer::cost::{Cost, Lambda, Weights};
 use trainer::data::{Matrix, Pairs, Split, split};
-use trainer::figures::{Chart, Curve};
+use trainer::hand::motion::Generator;
+use trainer::hand::{Scripted, start_pairs};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::Normalisation;
-use trainer::motion::Generator;
 use trainer::network::{Initialisation, Network};
-use trainer::operator::{GroundTruth, Operator, Scripted, start_pairs};
-use trainer::shapes::ShapePair;
+use trainer::operator::{GroundTruth, Operator};
 
 type Result<T> = core::result::Result<T, Box<dyn core::error::Error>>;
 
@@ -452,7 +453,9 @@ fn everything(folder: &Path) -> Result<()> {
     let charts: Vec<Chart> = [1, 2].into_iter().flat_map(speed).collect();
     std::fs::create_dir_all(folder)?;
     let drawing = folder.join("training-time.svg");
-    trainer::figures::charts(&drawing, &charts)?;
+    let drawn = charts::charts(&charts)?;
+    std::fs::write(&drawing, drawn.svg)?;
+    std::fs::write(drawing.with_extension("csv"), drawn.csv)?;
     println!("drawn into {}", drawing.display());
     println!("| model | threads | s | processor s | resident MB so far |\n|---|---|---|---|---|");
     for threads in [1, 2] {
