@@ -174,7 +174,9 @@ fn train(
         input: &domain.units.0,
         target: &domain.units.1,
     };
-    let trained = trainer.run(&mut operator, &mut |_| ControlFlow::Continue(()))?;
+    let go_on = &mut |_: &mut Trainer| ControlFlow::Continue(());
+    let trained = trainer.train_with(&mut operator, 50, go_on)?;
+    let trained = trained.ok_or("stopped")?;
     let used = processor_seconds()
         .zip(before)
         .map(|(now, then)| now - then);
@@ -201,7 +203,8 @@ fn estimate(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result
     };
     let start = Instant::now();
     let mut told = Vec::new();
-    trainer.run(&mut operator, &mut |progress| {
+    trainer.train_with(&mut operator, 50, &mut |trainer| {
+        let progress = trainer.progress();
         told.push((
             start.elapsed().as_secs_f64(),
             progress.remaining.as_secs_f64(),

@@ -160,18 +160,8 @@ impl Laboratory {
         loop {
             let start = Instant::now();
             let pause = pause_after(cell.trace_every, trainer.epoch());
-            let step = train_until((&mut trainer, cell), &mut prepared, pause, watch);
+            let done = train_until((&mut trainer, cell), &mut prepared, pause, watch)?;
             seconds += start.elapsed().as_secs_f64();
-            let done = match step {
-                Ok(()) => true,
-                // A stop that was asked for at that very epoch is one.
-                Err(algorithm::Error::Stopped { epoch })
-                    if Some(epoch) == pause && !watch.stop() =>
-                {
-                    false
-                }
-                Err(error) => return Err(fail(error)),
-            };
             if cell.trace_every > 0 {
                 let now = prepared.measure(&trainer.networks().f);
                 trace.push((trainer.epoch(), now));
@@ -212,19 +202,13 @@ impl Laboratory {
     pub fn stages(&self, cell: &Cell, watch: &dyn Watch) -> Result<Vec<Stage>, Error> {
         let mut prepared = self.prepare(cell)?;
         let each = cell.plan().stage_epochs.max(1);
-        prepared.settings.report_every = often(each);
         let fail = |source| failure(cell, source);
         let mut trainer =
             Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
         let mut stages = Vec::new();
         for stage in 0..=cell.pairs {
             let pause = (stage < cell.pairs).then_some((stage + 1) * each);
-            match train_until((&mut trainer, cell), &mut prepared, pause, watch) {
-                Ok(()) => {}
-                Err(algorithm::Error::Stopped { epoch })
-                    if Some(epoch) == pause && !watch.stop() => {}
-                Err(error) => return Err(fail(error)),
-            }
+            train_until((&mut trainer, cell), &mut prepared, pause, watch)?;
             stages.push((trainer.networks().f, trainer.pairs().clone()));
         }
         Ok(stages)
@@ -232,20 +216,19 @@ impl Laboratory {
 }
 
 fn failure(cell: &Cell, source: algorithm::Error) -> Error {
-    match source {
-        algorithm::Error::Stopped { .. } => Error::Stopped,
-        source => Error::Training {
-            cell: cell.slug(),
-            source,
-        },
+    Error::Training {
+        cell: cell.slug(),
+        source,
     }
 }
+
+/// Most epochs between two looks at the clock.
+const MOST_OFTEN: usize = 10;
 
 /// Epochs between two looks at the clock, of which each `pause` epochs are one: few, so that a stop is heard within a second or two
 /// whatever the machine.
 fn often(pause: usize) -> usize {
-    const MOST: usize = 10;
-    (1..=MOST)
+    (1..=MOST_OFTEN)
         .rev()
         .find(|each| pause.is_multiple_of(*each))
         .unwrap_or(1)
@@ -256,32 +239,37 @@ fn pause_after(every: usize, epoch: usize) -> Option<usize> {
     (every > 0).then(|| (epoch / every + 1) * every)
 }
 
-/// Trains to the end, or to `pause`, which shows as [`algorithm::Error::Stopped`] at that epoch.
+/// Trains to the end, or to `pause`; whether that was the end.
 fn train_until(
     (trainer, cell): (&mut Trainer, &Cell),
     prepared: &mut Prepared,
     pause: Option<usize>,
     watch: &dyn Watch,
-) -> Result<(), algorithm::Error> {
+) -> Result<bool, Error> {
     let mut operator = InUnits {
         operator: prepared.operator.as_mut(),
         input: &prepared.units.0,
         target: &prepared.units.1,
     };
-    let total = trainer.total();
     let mut before = trainer.epoch();
-    let trained = trainer.run(&mut operator, &mut |progress| {
+    let each = often(pause.unwrap_or(MOST_OFTEN));
+    let trained = trainer.train_with(&mut operator, each, &mut |trainer| {
+        let progress = trainer.progress();
         let epochs = progress.epoch.saturating_sub(before) as f64;
         before = progress.epoch;
         watch.advance(epochs * cell.epoch_work(progress.weights.attraction > 0.0));
-        let pauses = Some(progress.epoch) == pause && progress.epoch < total;
-        if pauses || watch.stop() {
+        if Some(progress.epoch) == pause || watch.stop() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     });
-    trained.map(|_| ())
+    let is_done = trained.map_err(|source| failure(cell, source))?.is_some();
+    if is_done || Some(trainer.epoch()) == pause {
+        Ok(is_done)
+    } else {
+        Err(Error::Stopped)
+    }
 }
 
 fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<Prepared, Error> {
@@ -334,7 +322,6 @@ fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
         initialisation: cell.initialisation,
         // Cells run side by side: one thread each.
         threads: 1,
-        report_every: often(cell.trace_every),
         ..Settings::shapes(plan, cell.seed)
     }
 }
