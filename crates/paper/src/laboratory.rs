@@ -265,11 +265,11 @@ fn train_until(
         }
     });
     let is_done = trained.map_err(|source| failure(cell, source))?.is_some();
-    if is_done || Some(trainer.epoch()) == pause {
-        Ok(is_done)
-    } else {
-        Err(Error::Stopped)
+    // A stop that is asked for at a pause is one.
+    if !is_done && watch.stop() {
+        return Err(Error::Stopped);
     }
+    Ok(is_done)
 }
 
 fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<Prepared, Error> {
