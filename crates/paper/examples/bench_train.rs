@@ -1,7 +1,7 @@
 //! Measures training: time a step and a model, quality by data set and schedule.
 //!
 //! `cargo run --release -p paper --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
-//! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
+//! data sets: sp1 to sp4, hand (generated motion), hand-1 (for a gripper of one axis), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
 //! differs from the fast one on a plane (`m1`, `m2`, `stage_rate`, `rate`, `decay`, `start`, `ramp`, `cool`, `batches`; see
 //! `trainer::algorithm::Plan`); seeds: `5`, or `6-10`; then threads, and the deviation of initial weights that are normally distributed.
 //! `-- estimate hand fast 3` says how right the estimate of the time left is along the way (words as of `quality`).
@@ -22,7 +22,7 @@ use trainer::cost::reference::Autoencoder;
 use trainer::cost::{Cost, Lambda, Weights};
 use trainer::data::{Matrix, Pairs, Split, split};
 use trainer::hand::motion::Generator;
-use trainer::hand::{Scripted, start_pairs};
+use trainer::hand::{Draw, Scripted, Space, start_pairs};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::Normalisation;
 use trainer::network::{Initialisation, Network};
@@ -75,28 +75,23 @@ fn shape(pair: ShapePair, seed: u64) -> Result<Domain> {
     })
 }
 
-fn hand(recording: Option<&str>, seed: u64) -> Result<Domain> {
+fn hand(space: Space, recording: Option<&str>, seed: u64) -> Result<Domain> {
     let limits = &glove::hand::LIMITS;
     let (frames, mut operator) = match recording {
         None => (
             Generator::new(limits, seed).frames(635, 9.2),
-            Scripted::new(limits),
+            Scripted::new(space, limits),
         ),
         Some(path) => {
             let frames = trainer::data::read_poses(path, &glove::hand::JOINT_NAMES)?.rows;
-            let operator = Scripted::for_recording(&frames)?;
+            let operator = Scripted::for_recording(space, &frames)?;
             (frames, operator)
         }
     };
     let Split { train, test } = split(frames.rows, 0.6, seed);
-    let units = (Normalisation::identity(25), Normalisation::gripper(4));
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut targets = Matrix::default();
-    for _ in 0..8000 {
-        let sample = gripper::space::sample(|| random.random::<f32>());
-        targets.push(&units.1.apply(&sample));
-    }
-    let shown = start_pairs(&mut operator)?;
+    let units = (Normalisation::identity(25), space.units());
+    let targets = units.1.apply_all(&space.samples(8000, seed, Draw::Train));
+    let shown = start_pairs(space, &mut operator)?;
     let start = Pairs {
         inputs: units.0.apply_all(&shown.inputs),
         targets: units.1.apply_all(&shown.targets),
@@ -105,12 +100,23 @@ fn hand(recording: Option<&str>, seed: u64) -> Result<Domain> {
         train: frames.select(&train),
         test: frames.select(&test),
         targets,
-        coverage: Coverage::GRIPPER,
+        coverage: network_units(space.coverage(), &units.1),
         truth: None,
         operator: Box::new(operator),
         units,
         settings: Settings::hand(start, 8, seed),
     })
+}
+
+/// A volume in counts as one in network units, the same on every axis.
+fn network_units(coverage: Coverage, units: &Normalisation) -> Coverage {
+    match coverage {
+        Coverage::Volume { volume, dimension } => Coverage::Volume {
+            volume: volume / f64::from(units.scale[0]).powi(dimension as i32),
+            dimension,
+        },
+        other => other,
+    }
 }
 
 fn domain(name: &str, seed: u64) -> Result<Domain> {
@@ -119,8 +125,9 @@ fn domain(name: &str, seed: u64) -> Result<Domain> {
         "sp2" => shape(ShapePair::Sp2, seed),
         "sp3" => shape(ShapePair::Sp3, seed),
         "sp4" => shape(ShapePair::Sp4, seed),
-        "hand" => hand(None, seed),
-        path => hand(Some(path), seed),
+        "hand-1" => hand(Space::OneAxis, None, seed),
+        "hand" => hand(Space::ThreeFinger, None, seed),
+        path => hand(Space::ThreeFinger, Some(path), seed),
     }
 }
 

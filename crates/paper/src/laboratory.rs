@@ -8,17 +8,18 @@ use std::time::Instant;
 use trainer::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
 use trainer::cost::Lambda;
 use trainer::data::{self, Matrix, Pairs};
-use trainer::hand::Scripted;
 use trainer::hand::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
 use trainer::hand::table3;
+use trainer::hand::{Draw, Scripted, Space};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::{Metadata, Model, Normalisation};
 use trainer::network::Network;
 use trainer::operator::{GroundTruth, Operator};
-use trainer::random::Random;
 
 /// Target samples of every experiment (§3.2.1, §3.3.2).
 const TARGETS: usize = 8000;
+/// The gripper of the hand's experiments.
+const HAND: Space = Space::ThreeFinger;
 /// Random numbers of the gripper's samples.
 const TARGET_STREAM: u64 = 0x4752_4950;
 
@@ -98,11 +99,11 @@ impl Laboratory {
             Source::Shape(pair) => self.prepare_shape(cell, pair),
             Source::Generated => {
                 let frames = Generator::new(&self.limits, cell.seed).frames(FRAMES, RATE_HZ);
-                prepare_hand(cell, &frames, Scripted::new(&self.limits))
+                prepare_hand(cell, &frames, Scripted::new(HAND, &self.limits))
             }
             Source::Recorded => {
                 let frames = self.recording.as_ref().ok_or(Error::NoRecording)?;
-                prepare_hand(cell, frames, Scripted::for_recording(frames)?)
+                prepare_hand(cell, frames, Scripted::for_recording(HAND, frames)?)
             }
         }
     }
@@ -292,23 +293,15 @@ fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<
     Ok(Prepared {
         train: frames.select(&split.train),
         test: frames.select(&split.test),
-        targets: units.1.apply_all(&gripper_samples(TARGETS, cell.seed)),
+        targets: units
+            .1
+            .apply_all(&HAND.samples(TARGETS, cell.seed, Draw::Stream(TARGET_STREAM))),
         truth: None,
         coverage: Coverage::GRIPPER,
         units,
         operator: Box::new(operator),
         settings: settings(cell, plan, Lambda::HAND),
     })
-}
-
-/// `count` poses, uniform in the gripper's configuration space, counts.
-#[must_use]
-pub fn gripper_samples(count: usize, seed: u64) -> Matrix {
-    let mut random = Random::new(seed, TARGET_STREAM);
-    let poses: Vec<[f32; 4]> = (0..count)
-        .map(|_| gripper::space::sample(|| random.unit()))
-        .collect();
-    Matrix::from_rows(&poses)
 }
 
 fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {

@@ -10,7 +10,7 @@ pub mod stats;
 mod store;
 mod table;
 
-pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch, gripper_samples};
+pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch};
 pub use principal::Principal;
 pub use store::{Kept, Store, run_all};
 pub use table::{Entry, Order, Table, number};

@@ -306,16 +306,13 @@ fn a_map_that_leaves_half_of_the_target_uncovered_says_so_in_time() {
 
 /// A hand of the motion generator, as `Settings::hand` trains it, for a moment.
 fn hand_task() -> (Matrix, Matrix, Settings, InHand) {
-    use crate::hand::{Scripted, motion::Generator, start_pairs};
+    use crate::hand::{Scripted, Space, motion::Generator, start_pairs};
     let limits = &glove::hand::LIMITS;
     let frames = Generator::new(limits, 5).frames(160, 4.0);
     let units = (Normalisation::identity(25), Normalisation::gripper(4));
-    let mut random = Random::new(5, 1);
-    let poses: Vec<[f32; 4]> = (0..600)
-        .map(|_| gripper::space::sample(|| random.unit()))
-        .collect();
-    let mut operator = Scripted::new(limits);
-    let shown = start_pairs(&mut operator).unwrap();
+    let poses = Space::ThreeFinger.samples(600, 5, crate::hand::Draw::Stream(1));
+    let mut operator = Scripted::new(Space::ThreeFinger, limits);
+    let shown = start_pairs(Space::ThreeFinger, &mut operator).unwrap();
     let start = Pairs {
         inputs: shown.inputs,
         targets: units.1.apply_all(&shown.targets),
@@ -333,7 +330,7 @@ fn hand_task() -> (Matrix, Matrix, Settings, InHand) {
         threads: 2,
         ..Settings::hand(start, 4, 5)
     };
-    let targets = units.1.apply_all(&Matrix::from_rows(&poses));
+    let targets = units.1.apply_all(&poses);
     (frames, targets, settings, InHand { operator, units })
 }
 

@@ -4,29 +4,26 @@
 pub mod motion;
 mod person;
 mod scripted;
+mod space;
 pub mod table3;
 
 pub use scripted::Scripted;
+pub use space::{Draw, Space};
 
 use crate::data::Pairs;
 use crate::operator::{Error, Operator};
-
-/// The gripper's resting pose in counts, finger A, B, C and scissor, that belongs to the open hand.
-pub const OPEN_HAND: [f32; 4] = [0.0, 0.0, 0.0, 130.0];
-/// The gripper's pose in counts that belongs to the fist.
-pub const FIST: [f32; 4] = [255.0, 255.0, 255.0, 130.0];
 
 /// The two pairs that start a person's session: the open hand and the fist, as `operator` shows them. With the paper's empty start
 /// set an open hand need not end as an open gripper.
 ///
 /// # Errors
 /// Those of the operator.
-pub fn start_pairs(operator: &mut dyn Operator) -> Result<Pairs, Error> {
+pub fn start_pairs(space: Space, operator: &mut dyn Operator) -> Result<Pairs, Error> {
     let mut pairs = Pairs::default();
-    for target in [OPEN_HAND, FIST] {
-        let shown = operator.demonstrate(&target)?;
+    for target in space.start() {
+        let shown = operator.demonstrate(target)?;
         pairs.inputs.push(&shown);
-        pairs.targets.push(&target);
+        pairs.targets.push(target);
     }
     Ok(pairs)
 }
