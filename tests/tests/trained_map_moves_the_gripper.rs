@@ -14,7 +14,7 @@ use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
 use trainer::algorithm::Schedule;
-use trainer::motion::Generator;
+use trainer::hand::motion::Generator;
 
 const SEED: u64 = 1;
 /// The heartbeat of the clutch, microseconds.

@@ -44,7 +44,7 @@ pub fn train() -> Result<(), Failure> {
             "--release",
             "--locked",
             "--package",
-            "trainer",
+            "paper",
             "--example",
             "bench_train",
         ]),

@@ -7,8 +7,8 @@ use anyhow::Result;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES, LIMITS};
 use rig::{FlatFirst, PoseSource};
 use trainer::data::{Columns, Error, Matrix, Poses, Table, require_rows};
+use trainer::hand::motion::{FRAMES, Generator, RATE_HZ};
 use trainer::measures::NEIGHBOURS;
-use trainer::motion::{FRAMES, Generator, RATE_HZ};
 
 use crate::failure::told;
 use crate::note;

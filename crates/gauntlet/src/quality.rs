@@ -1,10 +1,8 @@
 //! How good a map is, in numbers a person can judge.
 
-use rand::RngExt;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
 use serde::Serialize;
 use trainer::data::{Matrix, Pairs};
+use trainer::hand::{Draw, Space};
 use trainer::measures::{Coverage, Test, measure, occupancy};
 use trainer::model::{Model, Normalisation};
 use trainer::spread::spread;
@@ -226,21 +224,16 @@ fn uniform_scale(units: &Normalisation) -> Option<f64> {
 
 /// Gripper poses spread evenly over the configuration space, counts: those to train on.
 pub fn targets(seed: u64) -> Matrix {
-    poses(seed, 0)
+    poses(seed, Draw::Train)
 }
 
 /// Others of the same kind, to measure with.
 pub fn measuring_targets(seed: u64) -> Matrix {
-    poses(seed, 1)
+    poses(seed, Draw::Measure)
 }
 
-fn poses(seed: u64, stream: u64) -> Matrix {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    random.set_stream(stream);
-    let rows: Vec<[f32; 4]> = (0..TARGETS)
-        .map(|_| gripper::space::sample(|| random.random::<f32>()))
-        .collect();
-    Matrix::from_rows(&rows)
+fn poses(seed: u64, draw: Draw) -> Matrix {
+    Space::ThreeFinger.samples(TARGETS, seed, draw)
 }
 
 #[cfg(test)]

@@ -1,16 +1,21 @@
 //! Algorithm 1: stages of M1 epochs, after each of which the target sample farthest from the image of f is shown and the operator's
 //! answer becomes a reference pair; then a last stage of M2 epochs in which the boundary attraction fades in.
 //!
+//! [`Trainer`] is a machine that is told how far to go, and says when it needs a pair: it waits for nobody, and can be left, kept
+//! and taken up between any two steps. Who shows the pairs stands outside ([`Trainer::train_with`] is for those who answer at once).
+//!
 //! All samples and pairs are in network units; [`InUnits`] lets an operator speak radians and counts.
 
 mod check;
 pub mod checkpoint;
 mod clock;
+mod drive;
 mod settings;
 #[cfg(test)]
 mod tests;
 
 pub use check::{Error, Warning};
+pub use drive::{InUnits, Nobody};
 pub use settings::{PairPlan, Plan, Schedule, Settings};
 
 use crate::cost::engine::Engine;
@@ -19,13 +24,10 @@ use crate::cost::{Parts, Weights};
 use crate::data::{Matrix, Pairs};
 use crate::kernel::Blocks;
 use crate::measures::{NEIGHBOURS, fold_factor, gap_factor};
-use crate::model::Normalisation;
 use crate::neighbours::{farthest, rows};
 use crate::network::Network;
-use crate::operator::{self, Operator};
 use crate::random::Random;
 use clock::Clock;
-use core::ops::ControlFlow;
 use core::time::Duration;
 
 /// Streams of random numbers of one seed.
@@ -38,7 +40,7 @@ const GAP: f64 = 3.0;
 /// A look at the map takes time with the square of the samples.
 const MOST_LOOKED_AT: usize = 2000;
 
-/// Where the training stands; given to the callback of [`Trainer::run`].
+/// Where the training stands.
 #[derive(Clone, Debug)]
 pub struct Progress<'a> {
     /// Epochs done, and of how many.
@@ -59,8 +61,6 @@ pub struct Progress<'a> {
     pub pairs: &'a Pairs,
     /// How long the rest will take at the speed so far, without the time that a person needs.
     pub remaining: Duration,
-    /// Something that a person should know now.
-    pub warning: Option<Warning>,
 }
 
 /// The result of a training.
@@ -76,34 +76,15 @@ pub struct Trained {
     pub parts: Parts,
 }
 
-/// No operator: for fixed pairs.
-#[derive(Clone, Copy, Debug)]
-pub struct Nobody;
-
-impl Operator for Nobody {
-    fn demonstrate(&mut self, _: &[f32]) -> Result<Vec<f32>, operator::Error> {
-        Err(operator::Error::Declined {
-            why: "adaptive pairs need an operator, and there is none; give one, or use fixed pairs"
-                .into(),
-        })
-    }
-}
-
-/// Lets an operator work in the units of its domain while the trainer works in network units, (value − offset)/scale.
-pub struct InUnits<'a> {
-    /// Who answers.
-    pub operator: &'a mut dyn Operator,
-    /// How inputs become network units.
-    pub input: &'a Normalisation,
-    /// How targets become network units.
-    pub target: &'a Normalisation,
-}
-
-impl Operator for InUnits<'_> {
-    fn demonstrate(&mut self, target: &[f32]) -> Result<Vec<f32>, operator::Error> {
-        let shown = self.operator.demonstrate(&self.target.invert(target))?;
-        Ok(self.input.apply(&shown))
-    }
+/// How far [`Trainer::advance`] came.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Advance {
+    /// As far as it was told.
+    Trained,
+    /// A pair is due: [`Trainer::show`] takes the input that belongs to this target before it goes on.
+    NeedsPair(Vec<f32>),
+    /// All epochs are done.
+    Done,
 }
 
 /// A training, from its first step to its last.
@@ -117,6 +98,9 @@ pub struct Trainer {
     epoch: usize,
     parts: Parts,
     warnings: Vec<Warning>,
+    /// The target whose input is waited for.
+    needs: Option<Vec<f32>>,
+    clock: Option<Clock>,
 }
 
 impl Trainer {
@@ -147,6 +131,8 @@ impl Trainer {
             epoch: 0,
             parts: Parts::default(),
             warnings,
+            needs: None,
+            clock: None,
         })
     }
 
@@ -174,46 +160,87 @@ impl Trainer {
         &self.pairs
     }
 
-    /// Trains to the end. `progress` is called every [`Settings::report_every`] epochs and after each pair; `Break` stops the training.
+    /// Trains for `epochs` more, less where a pair is due or the end is reached before.
     ///
     /// # Errors
-    /// [`Error::Stopped`], [`Error::Diverged`], and whatever the operator says.
-    pub fn run(
-        &mut self,
-        operator: &mut dyn Operator,
-        progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
-    ) -> Result<Trained, Error> {
-        let mut clock = Clock::start(self);
-        for warning in core::mem::take(&mut self.warnings) {
-            self.report(&clock, progress, Some(warning))?;
-        }
-        while self.epoch < self.total() {
-            self.pair_if_due(operator)?;
+    /// [`Error::Diverged`].
+    pub fn advance(&mut self, epochs: usize) -> Result<Advance, Error> {
+        let mut clock = self.clock.take().unwrap_or_else(|| Clock::start(self));
+        clock.rest();
+        let end = self.epoch.saturating_add(epochs);
+        let came = loop {
+            if self.epoch >= self.total() {
+                break Advance::Done;
+            }
+            if self.epoch >= end {
+                break Advance::Trained;
+            }
+            if let Some(target) = self.due_target() {
+                break Advance::NeedsPair(target);
+            }
             self.step();
             clock.tick(self);
             clock.probe(self);
-            let every = self.settings.report_every.max(1);
-            let is_report_due = self.epoch.is_multiple_of(every) || self.epoch == self.total();
-            if is_report_due && !self.engine.parameters().iter().all(|p| p.is_finite()) {
-                return Err(Error::Diverged { epoch: self.epoch });
-            }
-            // Before the report: whoever stops the training there hears of a fold first.
             if self.is_look_due() {
-                for warning in self.look_at_map() {
-                    self.report(&clock, progress, Some(warning))?;
-                }
+                let warnings = self.look_at_map();
+                self.warnings.extend(warnings);
                 clock.rest();
             }
-            if is_report_due {
-                self.report(&clock, progress, None)?;
-            }
+        };
+        self.clock = Some(clock);
+        if self.engine.parameters().iter().all(|p| p.is_finite()) {
+            Ok(came)
+        } else {
+            Err(Error::Diverged { epoch: self.epoch })
         }
-        Ok(Trained {
+    }
+
+    /// Takes the input for the target that [`Advance::NeedsPair`] named.
+    ///
+    /// # Errors
+    /// [`Error::Answer`] for one of another shape or not finite, which may be shown again; [`Error::Unasked`].
+    pub fn show(&mut self, input: &[f32]) -> Result<(), Error> {
+        check::answer(input, self.q.cols)?;
+        let target = self.needs.take().ok_or(Error::Unasked)?;
+        // Lengths were checked, so both are taken.
+        let _ = self.pairs.inputs.push(input) && self.pairs.targets.push(&target);
+        self.engine
+            .set_pairs(&self.pairs.inputs, &self.pairs.targets);
+        Ok(())
+    }
+
+    /// Where it stands.
+    #[must_use]
+    pub fn progress(&self) -> Progress<'_> {
+        let weights = self.weights(self.epoch.saturating_sub(1));
+        let clock = self.clock.as_ref();
+        Progress {
+            epoch: self.epoch,
+            total: self.total(),
+            stage: self.stage(),
+            stages: self.early_stages() + 1,
+            parts: self.parts,
+            cost: self.parts.total(&weights),
+            weights,
+            pairs: &self.pairs,
+            remaining: clock.map_or(Duration::ZERO, |clock| clock.remaining(self)),
+        }
+    }
+
+    /// What a person should know, each once.
+    pub fn take_warnings(&mut self) -> Vec<Warning> {
+        core::mem::take(&mut self.warnings)
+    }
+
+    /// The map as it stands.
+    #[must_use]
+    pub fn trained(&self) -> Trained {
+        Trained {
             networks: self.networks(),
             pairs: self.pairs.clone(),
             epochs: self.epoch,
             parts: self.parts,
-        })
+        }
     }
 
     /// The map is looked at when λ3 has just reached its full value, and at the end.
@@ -239,31 +266,6 @@ impl Trainer {
             warnings.push(Warning::Uncovered { factor });
         }
         warnings
-    }
-
-    fn report(
-        &self,
-        clock: &Clock,
-        progress: &mut dyn FnMut(&Progress<'_>) -> ControlFlow<()>,
-        warning: Option<Warning>,
-    ) -> Result<(), Error> {
-        let weights = self.weights(self.epoch.saturating_sub(1));
-        let report = Progress {
-            epoch: self.epoch,
-            total: self.total(),
-            stage: self.stage(),
-            stages: self.early_stages() + 1,
-            parts: self.parts,
-            cost: self.parts.total(&weights),
-            weights,
-            pairs: &self.pairs,
-            remaining: clock.remaining(self),
-            warning,
-        };
-        match progress(&report) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Error::Stopped { epoch: self.epoch }),
-        }
     }
 
     /// Stages before the last.
@@ -298,27 +300,20 @@ impl Trainer {
         }
     }
 
-    /// Lines 3 to 5 of Algorithm 1, at the end of each early stage.
-    fn pair_if_due(&mut self, operator: &mut dyn Operator) -> Result<(), Error> {
+    /// Lines 3 to 5 of Algorithm 1, at the end of each early stage: the target sample farthest from the image of f.
+    fn due_target(&mut self) -> Option<Vec<f32>> {
         let PairPlan::Adaptive { start, count } = &self.settings.pairs else {
-            return Ok(());
+            return None;
         };
         let due = (self.epoch / self.plan.stage_epochs.max(1)).min(*count);
         if self.pairs.inputs.rows >= start.inputs.rows + due {
-            return Ok(());
+            return None;
         }
-        let codes = samples(&self.engine.codes());
-        let Some(index) = farthest(&self.x, &codes) else {
-            return Ok(());
-        };
-        let target = self.x.row(index).to_vec();
-        let input = operator.demonstrate(&target)?;
-        check::answer(&input, self.q.cols)?;
-        // Lengths were checked, so both are taken.
-        let _ = self.pairs.inputs.push(&input) && self.pairs.targets.push(&target);
-        self.engine
-            .set_pairs(&self.pairs.inputs, &self.pairs.targets);
-        Ok(())
+        if self.needs.is_none() {
+            let codes = samples(&self.engine.codes());
+            self.needs = farthest(&self.x, &codes).map(|index| self.x.row(index).to_vec());
+        }
+        self.needs.clone()
     }
 }
 

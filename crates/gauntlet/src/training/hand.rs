@@ -9,11 +9,12 @@ use gripper::space;
 use trainer::algorithm::{PairPlan, Schedule};
 use trainer::cost::Lambda;
 use trainer::data::{Columns, Matrix, Pairs, Table, split};
+use trainer::hand::table3;
+use trainer::hand::{Scripted, Space, start_pairs};
 use trainer::measures::NEIGHBOURS;
 use trainer::model::{Model, Normalisation};
-use trainer::operator::{Operator, Scripted, start_pairs};
+use trainer::operator::Operator;
 use trainer::spread::spread;
-use trainer::table3;
 
 use super::domains::first;
 use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};
@@ -183,8 +184,10 @@ pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -
 /// Who answers for the person.
 fn operator(motion: &Motion, training: &Matrix) -> Result<Scripted> {
     match motion {
-        Motion::Generated { .. } => Ok(Scripted::new(&LIMITS)),
-        Motion::Recorded { .. } => Scripted::for_recording(training).map_err(told),
+        Motion::Generated { .. } => Ok(Scripted::new(Space::ThreeFinger, &LIMITS)),
+        Motion::Recorded { .. } => {
+            Scripted::for_recording(Space::ThreeFinger, training).map_err(told)
+        }
     }
 }
 
@@ -209,7 +212,9 @@ fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPla
         PairKind::Adaptive => {
             let start = match wanted.file {
                 Some(file) => from_file(file)?,
-                None if wanted.start_pairs => start_pairs(operator).map_err(told)?,
+                None if wanted.start_pairs => {
+                    start_pairs(Space::ThreeFinger, operator).map_err(told)?
+                }
                 None => Pairs::default(),
             };
             let plan = PairPlan::Adaptive {

@@ -5,8 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use trainer::algorithm::{Error, InUnits, Trained, Trainer};
-use trainer::operator::Operator;
+use trainer::algorithm::{InUnits, Trainer};
 
 use super::told::Told;
 use super::{Course, Ended, Learned, Task};
@@ -16,6 +15,8 @@ use crate::progress::Progress;
 
 /// A state is kept so often.
 const KEEP_EVERY: Duration = Duration::from_secs(60);
+/// Epochs between two looks at the clock: often enough for a smooth bar and a prompt Ctrl-C.
+const LOOK_EVERY: usize = 10;
 
 /// Trains to the end, or to where it is to stop.
 ///
@@ -45,83 +46,64 @@ pub fn learn(task: &mut Task, course: &Course, interrupt: &Interrupt) -> Result<
         warnings: Vec::new(),
         names: task.names,
     };
-    loop {
-        let (ended, pause) = slice(
-            &mut trainer,
-            &mut operator,
-            course,
-            interrupt,
-            &mut told_so_far,
-        );
-        match (ended, pause) {
-            (Ok(trained), _) => {
-                let Told {
-                    progress, warnings, ..
-                } = told_so_far;
-                let took = progress.finish();
-                return Ok(Ended::Trained(Box::new(Learned {
-                    trained,
-                    took,
-                    warnings,
-                })));
-            }
-            (Err(Error::Stopped { epoch }), pause) => {
-                let kept = match &course.checkpoint {
-                    Some(path) => trainer.save_checkpoint(path).map_err(told),
-                    None => Ok(()),
-                };
-                match (pause, kept) {
-                    (Pause::Keep, Ok(())) => {}
-                    // The training is worth more than its copy.
-                    (Pause::Keep, Err(error)) => told_so_far.warn(format!(
-                        "{error} (epoch {epoch}): the training goes on, and is tried to be kept again in a minute"
-                    )),
-                    (_, Err(error)) => return Err(error),
-                    (Pause::StopAt, Ok(())) => return Ok(Ended::StoppedAt(epoch)),
-                    (Pause::Interrupt, Ok(())) => return Err(broken_off(course, epoch)),
-                }
-            }
-            (Err(other), _) => return Err(told(other)),
+    let mut pause = Pause::Interrupt;
+    let mut kept = Instant::now();
+    let each = if course.stop_at.is_some() {
+        1
+    } else {
+        LOOK_EVERY
+    };
+    let trained = trainer.train_with(&mut operator, each, &mut |trainer| {
+        for warning in trainer.take_warnings() {
+            told_so_far.tell(&warning, &trainer.progress());
         }
+        told_so_far.show(&trainer.progress());
+        if interrupt.asked() {
+            pause = Pause::Interrupt;
+            return ControlFlow::Break(());
+        }
+        if course.stop_at.is_some_and(|epoch| trainer.epoch() >= epoch) {
+            pause = Pause::StopAt;
+            return ControlFlow::Break(());
+        }
+        if let Some(path) = course.checkpoint.as_ref().filter(|_| kept.elapsed() >= KEEP_EVERY) {
+            kept = Instant::now();
+            if let Err(error) = trainer.save_checkpoint(path) {
+                // The training is worth more than its copy.
+                told_so_far.warn(format!(
+                    "{error} (epoch {}): the training goes on, and is tried to be kept again in a minute",
+                    trainer.epoch()
+                ));
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    if let Some(trained) = trained.map_err(told)? {
+        let Told {
+            progress, warnings, ..
+        } = told_so_far;
+        return Ok(Ended::Trained(Box::new(Learned {
+            trained,
+            took: progress.finish(),
+            warnings,
+        })));
+    }
+    if let Some(path) = &course.checkpoint {
+        trainer.save_checkpoint(path).map_err(told)?;
+    }
+    match pause {
+        Pause::StopAt => Ok(Ended::StoppedAt(trainer.epoch())),
+        Pause::Interrupt => Err(broken_off(course, trainer.epoch())),
     }
 }
 
-/// Why a training pauses.
+/// Why a training ends before its end.
 #[derive(Debug, Clone, Copy)]
 enum Pause {
-    /// To keep its state.
-    Keep,
     /// It is where it was to stop.
     StopAt,
     /// A person asked.
     Interrupt,
-}
-
-/// Trains until it is done or must pause.
-fn slice(
-    trainer: &mut Trainer,
-    operator: &mut dyn Operator,
-    course: &Course,
-    interrupt: &Interrupt,
-    told_so_far: &mut Told,
-) -> (std::result::Result<Trained, Error>, Pause) {
-    let started = Instant::now();
-    let mut pause = Pause::Interrupt;
-    let result = trainer.run(operator, &mut |step| {
-        told_so_far.show(step);
-        let is_done = step.epoch == step.total;
-        if interrupt.asked() {
-            pause = Pause::Interrupt;
-        } else if course.stop_at.is_some_and(|epoch| step.epoch >= epoch) && !is_done {
-            pause = Pause::StopAt;
-        } else if course.checkpoint.is_some() && started.elapsed() >= KEEP_EVERY && !is_done {
-            pause = Pause::Keep;
-        } else {
-            return ControlFlow::Continue(());
-        }
-        ControlFlow::Break(())
-    });
-    (result, pause)
 }
 
 fn named(path: &Path, error: &trainer::algorithm::checkpoint::Error) -> anyhow::Error {

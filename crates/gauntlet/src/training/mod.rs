@@ -27,8 +27,6 @@ use crate::quality::Measured;
 
 /// Share of the frames that train; the rest measure (381 + 254 of the paper's 635).
 const TRAINING_SHARE: f64 = 0.6;
-/// Epochs between two looks at the clock: often enough for a smooth bar and a prompt Ctrl-C.
-const REPORT_EVERY: usize = 10;
 
 /// What to train on, in the domains' own units.
 pub struct Task {
@@ -174,11 +172,6 @@ impl Course {
         settings.hidden = self.hidden;
         settings.initialisation = self.initialisation;
         settings.threads = self.threads.unwrap_or(settings.threads);
-        settings.report_every = if self.stop_at.is_some() {
-            1
-        } else {
-            REPORT_EVERY
-        };
         settings
     }
 }

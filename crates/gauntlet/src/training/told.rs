@@ -13,11 +13,13 @@ pub(super) struct Told {
 }
 
 impl Told {
+    /// A warning of the training.
+    pub fn tell(&mut self, warning: &Warning, step: &Step<'_>) {
+        let text = self.words(warning, step);
+        self.warn(text);
+    }
+
     pub fn show(&mut self, step: &Step<'_>) {
-        if let Some(warning) = &step.warning {
-            let text = self.words(warning, step);
-            self.warn(text);
-        }
         let is_spreading = step.weights.attraction > 0.0;
         self.progress
             .at_with(step.epoch as u64, Some(step.remaining), || {

@@ -112,7 +112,7 @@ pub fn poses_file(folder: &Path, rows: usize) -> PathBuf {
 }
 
 pub fn poses_text(rows: usize) -> String {
-    let frames = trainer::motion::Generator::new(&glove::hand::LIMITS, 5).frames(rows, 9.2);
+    let frames = trainer::hand::motion::Generator::new(&glove::hand::LIMITS, 5).frames(rows, 9.2);
     let mut text = format!("time_s,{}\n", JOINTS.join(","));
     for (index, row) in frames.iter_rows().enumerate() {
         let values: Vec<String> = row.iter().map(f32::to_string).collect();

@@ -98,12 +98,9 @@ pub enum Error {
         /// Epochs done.
         epoch: usize,
     },
-    /// The progress callback asked to stop.
-    #[error("stopped at epoch {epoch}")]
-    Stopped {
-        /// Epochs done.
-        epoch: usize,
-    },
+    /// An input that belongs to no target.
+    #[error("no pair is asked for now; show an input when one is")]
+    Unasked,
 }
 
 /// What a person should know, though the training goes on.

@@ -1,6 +1,6 @@
 //! Stopping and going on later, bit for bit: weights, optimiser state, pairs and epoch in one safetensors file.
 
-use super::{Settings, Trainer};
+use super::Trainer;
 use crate::data::{Matrix, Pairs, sha256};
 use crate::optimizer::Nadam;
 use crate::whole_file;
@@ -11,7 +11,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// Version of this file's meaning.
-const VERSION: &str = "3";
+const VERSION: &str = "4";
 /// No checkpoint is longer; what has no end is none.
 const LONGEST: u64 = 256 << 20;
 /// The key of the digest over everything else.
@@ -62,19 +62,7 @@ fn broken(why: impl Into<String>) -> Error {
     Error::Broken { why: why.into() }
 }
 
-/// What must not change between stop and resumption: everything but threads and reports.
-fn fingerprint(settings: &Settings) -> String {
-    let same = Settings {
-        threads: 0,
-        report_every: 0,
-        answers: None,
-        ..settings.clone()
-    };
-    let hash = Sha256::digest(format!("{same:?}").as_bytes());
-    hexadecimal(&hash)
-}
-
-fn hexadecimal(bytes: &[u8]) -> String {
+pub(super) fn hexadecimal(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
@@ -157,7 +145,7 @@ impl Trainer {
             ("steps", nadam.steps.to_string()),
             ("pairs", self.pairs.inputs.rows.to_string()),
             ("data_sha256", sha256(&[&self.q, &self.x])),
-            ("settings_sha256", fingerprint(&self.settings)),
+            ("settings_sha256", self.settings.fingerprint()),
             (
                 "answers_sha256",
                 self.settings.answers.clone().unwrap_or_default(),
@@ -209,7 +197,7 @@ impl Trainer {
                 expected: start(&expected),
             });
         }
-        if *word("settings_sha256")? != fingerprint(&self.settings) {
+        if *word("settings_sha256")? != self.settings.fingerprint() {
             return Err(Error::OtherSettings);
         }
         if *word("answers_sha256")? != self.settings.answers.clone().unwrap_or_default() {
@@ -236,6 +224,8 @@ impl Trainer {
         }
         self.engine.set_pairs(&pairs.inputs, &pairs.targets);
         (self.pairs, self.epoch) = (pairs, epoch);
+        // The clock measures anew.
+        (self.needs, self.clock) = (None, None);
         Ok(())
     }
 }

@@ -1,9 +1,11 @@
 //! What a training is to do.
 
+use super::checkpoint::hexadecimal;
 use crate::cost::{Cost, Lambda};
-use crate::data::Pairs;
+use crate::data::{Pairs, sha256};
 use crate::network::{HIDDEN, Initialisation};
 use crate::optimizer::LearningRate;
+use sha2::{Digest, Sha256};
 
 /// Everything that decides the result, but the samples.
 #[derive(Clone, Debug)]
@@ -24,8 +26,6 @@ pub struct Settings {
     pub seed: u64,
     /// Threads to use; results do not depend on it.
     pub threads: usize,
-    /// Epochs between two calls of the progress callback.
-    pub report_every: usize,
     /// Digest of what the operator answers from, where it answers from data: a checkpoint goes on with the same only.
     pub answers: Option<String>,
 }
@@ -53,9 +53,51 @@ impl Settings {
             initialisation: Initialisation::Glorot,
             seed,
             threads: std::thread::available_parallelism().map_or(1, |n| n.get().min(2)),
-            report_every: 50,
             answers: None,
         }
+    }
+
+    /// Digest of what decides the result but the samples and the operator's answers: equal for equal settings, of any version.
+    #[must_use]
+    pub fn fingerprint(&self) -> String {
+        // Taken apart, so that a new field is not forgotten.
+        let Self {
+            cost,
+            lambda,
+            pairs,
+            schedule,
+            hidden,
+            initialisation,
+            seed,
+            threads: _,
+            answers: _,
+        } = self;
+        let Lambda {
+            distortion,
+            pin,
+            attraction,
+            alpha,
+        } = lambda;
+        let (count, start) = match pairs {
+            PairPlan::Fixed(pairs) => ("fixed".to_owned(), pairs),
+            PairPlan::Adaptive { start, count } => (format!("adaptive {count}"), start),
+        };
+        let start = sha256(&[&start.inputs, &start.targets]);
+        let initialisation = match initialisation {
+            Initialisation::Glorot => "glorot".to_owned(),
+            Initialisation::Normal(deviation) => format!("normal {deviation}"),
+        };
+        let schedule = match schedule {
+            Schedule::Paper => "paper".to_owned(),
+            Schedule::Fast => "fast".to_owned(),
+            Schedule::Custom(plan) => plan.words(),
+        };
+        let text = format!(
+            "cost {}; lambda {distortion} {pin} {attraction}; alpha {alpha}; pairs {count} {start}; schedule {schedule}; hidden {hidden}; \
+             initialisation {initialisation}; seed {seed}",
+            cost.name()
+        );
+        hexadecimal(&Sha256::digest(text.as_bytes()))
     }
 }
 
@@ -153,6 +195,24 @@ impl Schedule {
 }
 
 impl Plan {
+    /// All its numbers, in the order of its fields.
+    fn words(&self) -> String {
+        let Self {
+            stage_epochs,
+            last_epochs,
+            rate,
+            stage_rate,
+            cooling_epochs,
+            ramp_start,
+            ramp_epochs,
+            batches,
+        } = self;
+        format!(
+            "{stage_epochs} {last_epochs} {} {} {} {stage_rate} {cooling_epochs} {ramp_start} {ramp_epochs} {batches}",
+            rate.initial, rate.decay, rate.decay_steps
+        )
+    }
+
     /// [`Schedule::Fast`] on planes, on surfaces in space, and with four dimensions or more, as a hand's targets.
     fn fast(target_dimensions: usize) -> Self {
         let rate = |initial| LearningRate {
@@ -220,21 +280,6 @@ impl Plan {
             cooling_epochs: scale(self.cooling_epochs),
             ..self
         }
-    }
-
-    /// All its numbers, fit for a file's name.
-    pub(crate) fn slug(&self) -> String {
-        format!(
-            "{}x{}-{}x{}-{}-{}-{}-{}",
-            self.stage_epochs,
-            self.last_epochs,
-            self.stage_rate,
-            self.rate.initial,
-            self.ramp_start,
-            self.ramp_epochs,
-            self.cooling_epochs,
-            self.batches
-        )
     }
 }
 

@@ -1,6 +1,9 @@
 use super::*;
 use crate::cost::Cost;
+use crate::model::Normalisation;
+use crate::operator::{self, Operator};
 use crate::optimizer::LearningRate;
+use core::ops::ControlFlow;
 
 /// A half disc bent into space, mapped to a rectangle: a few hundred samples.
 fn samples() -> (Matrix, Matrix) {
@@ -60,8 +63,10 @@ fn short(batches: usize) -> Settings {
     }
 }
 
-fn go_on(_: &Progress<'_>) -> ControlFlow<()> {
-    ControlFlow::Continue(())
+/// To the end.
+fn train(trainer: &mut Trainer, operator: &mut dyn Operator) -> Result<Trained, Error> {
+    let trained = trainer.train_with(operator, 50, &mut |_| ControlFlow::Continue(()))?;
+    Ok(trained.unwrap())
 }
 
 #[test]
@@ -70,13 +75,13 @@ fn adaptive_pairs_are_asked_for_at_the_end_of_each_early_stage() {
     let mut operator = above();
     let mut trainer = Trainer::new(&q, &x, &short(1)).unwrap();
     let mut seen = Vec::new();
-    let settings_every = 1;
-    trainer.settings.report_every = settings_every;
     let trained = trainer
-        .run(&mut operator, &mut |p| {
+        .train_with(&mut operator, 1, &mut |trainer| {
+            let p = trainer.progress();
             seen.push((p.epoch, p.stage, p.pairs.inputs.rows, p.weights.attraction));
             ControlFlow::Continue(())
         })
+        .unwrap()
         .unwrap();
     assert_eq!(trained.epochs, 150);
     assert_eq!(operator.asked.len(), 3);
@@ -99,7 +104,7 @@ fn training_covers_the_target_and_keeps_the_pairs() {
     let mut settings = short(1);
     settings.schedule = Schedule::Custom(settings.schedule.plan().with_last_epochs(600));
     let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
-    let trained = trainer.run(&mut above(), &mut go_on).unwrap();
+    let trained = train(&mut trainer, &mut above()).unwrap();
     let pairs = &trained.pairs;
     for (q, x) in pairs.inputs.iter_rows().zip(pairs.targets.iter_rows()) {
         let image = trained.networks.f.eval(q);
@@ -125,7 +130,7 @@ fn one_thread_and_two_give_the_same_bits_and_another_seed_gives_others() {
             ..short(3)
         };
         let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
-        flat(&trainer.run(&mut above(), &mut go_on).unwrap())
+        flat(&train(&mut trainer, &mut above()).unwrap())
     };
     let one = run(1, 7);
     assert_eq!(one, run(2, 7));
@@ -137,27 +142,24 @@ fn a_training_stopped_anywhere_goes_on_bit_for_bit() {
     let (q, x) = samples();
     let settings = short(3);
     let mut whole = Trainer::new(&q, &x, &settings).unwrap();
-    let want = flat(&whole.run(&mut above(), &mut go_on).unwrap());
+    let want = flat(&train(&mut whole, &mut above()).unwrap());
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("stopped.safetensors");
     for stop in [1, 10, 17, 77, 149] {
-        let every = Settings {
-            report_every: 1,
-            ..settings.clone()
-        };
-        let mut first = Trainer::new(&q, &x, &every).unwrap();
-        let stopped = first.run(&mut above(), &mut |p| {
-            if p.epoch == stop {
+        let mut first = Trainer::new(&q, &x, &settings).unwrap();
+        let stopped = first.train_with(&mut above(), 1, &mut |trainer| {
+            if trainer.epoch() == stop {
                 return ControlFlow::Break(());
             }
             ControlFlow::Continue(())
         });
-        assert!(matches!(stopped, Err(Error::Stopped { epoch }) if epoch == stop));
+        assert!(stopped.unwrap().is_none());
+        assert_eq!(first.epoch(), stop);
         first.save_checkpoint(&file).unwrap();
         let mut second = Trainer::new(&q, &x, &settings).unwrap();
         second.load_checkpoint(&file).unwrap();
         assert_eq!(second.epoch(), stop);
-        let trained = second.run(&mut above(), &mut go_on).unwrap();
+        let trained = train(&mut second, &mut above()).unwrap();
         assert_eq!(flat(&trained), want, "stopped at {stop}");
     }
 }
@@ -216,7 +218,7 @@ fn bad_samples_pairs_and_answers_get_a_clear_line() {
     };
     assert!(say(&q, &x, &none).contains("hidden is 0"));
     let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
-    let error = trainer.run(&mut Nobody, &mut go_on).unwrap_err();
+    let error = train(&mut trainer, &mut Nobody).unwrap_err();
     assert!(error.to_string().contains("need an operator"), "{error}");
 }
 
@@ -236,12 +238,9 @@ fn constant_columns_duplicates_and_far_pairs_are_told_but_trained() {
         cost: Cost::Pin,
         ..short(1)
     };
-    let mut warnings = Vec::new();
     let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
-    let trained = trainer.run(&mut Nobody, &mut |p| {
-        warnings.extend(p.warning.clone());
-        ControlFlow::Continue(())
-    });
+    let warnings = trainer.take_warnings();
+    let trained = train(&mut trainer, &mut Nobody);
     assert!(trained.unwrap().networks.f.is_finite());
     assert_eq!(warnings.len(), 3, "{warnings:?}");
     assert!(warnings[0].to_string().contains("input column 3 is 0.25"));
@@ -264,7 +263,7 @@ fn a_training_that_diverges_says_so() {
     let (mut q, x) = samples();
     q.data.iter_mut().for_each(|v| *v *= 1e30);
     let mut trainer = Trainer::new(&q, &x, &short(1)).unwrap();
-    let error = trainer.run(&mut above(), &mut go_on).unwrap_err();
+    let error = train(&mut trainer, &mut above()).unwrap_err();
     assert!(matches!(error, Error::Diverged { .. }), "{error}");
 }
 
@@ -286,13 +285,16 @@ fn a_map_that_leaves_half_of_the_target_uncovered_says_so_in_time() {
     };
     let mut told = Vec::new();
     let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
-    let trained = trainer.run(&mut Nobody, &mut |p| {
-        if let Some(warning) = &p.warning {
-            told.push((p.epoch, warning.clone()));
-        }
+    let trained = trainer.train_with(&mut Nobody, 1, &mut |trainer| {
+        let warnings = trainer.take_warnings();
+        told.extend(
+            warnings
+                .into_iter()
+                .map(|warning| (trainer.epoch(), warning)),
+        );
         ControlFlow::Continue(())
     });
-    trained.unwrap();
+    assert!(trained.unwrap().is_some());
     let uncovered = |(_, w): &&(usize, Warning)| matches!(w, Warning::Uncovered { .. });
     let epochs: Vec<usize> = told
         .iter()
@@ -300,4 +302,146 @@ fn a_map_that_leaves_half_of_the_target_uncovered_says_so_in_time() {
         .map(|(epoch, _)| *epoch)
         .collect();
     assert_eq!(epochs, [80, 150], "{told:?}");
+}
+
+/// A hand of the motion generator, as `Settings::hand` trains it, for a moment.
+fn hand_task() -> (Matrix, Matrix, Settings, InHand) {
+    use crate::hand::{Scripted, Space, motion::Generator, start_pairs};
+    let limits = &glove::hand::LIMITS;
+    let frames = Generator::new(limits, 5).frames(160, 4.0);
+    let units = (Normalisation::identity(25), Normalisation::gripper(4));
+    let poses = Space::ThreeFinger.samples(600, 5, crate::hand::Draw::Stream(1));
+    let mut operator = Scripted::new(Space::ThreeFinger, limits);
+    let shown = start_pairs(Space::ThreeFinger, &mut operator).unwrap();
+    let start = Pairs {
+        inputs: shown.inputs,
+        targets: units.1.apply_all(&shown.targets),
+    };
+    let settings = Settings {
+        schedule: Schedule::Custom(Plan {
+            stage_epochs: 12,
+            last_epochs: 150,
+            ramp_start: 20,
+            ramp_epochs: 30,
+            cooling_epochs: 40,
+            ..Schedule::Fast.plan_for(4)
+        }),
+        hidden: 24,
+        threads: 2,
+        ..Settings::hand(start, 4, 5)
+    };
+    let targets = units.1.apply_all(&poses);
+    (frames, targets, settings, InHand { operator, units })
+}
+
+/// The scripted operator in network units.
+struct InHand {
+    operator: crate::hand::Scripted,
+    units: (Normalisation, Normalisation),
+}
+
+impl Operator for InHand {
+    fn demonstrate(&mut self, target: &[f32]) -> Result<Vec<f32>, operator::Error> {
+        let mut operator = InUnits {
+            operator: &mut self.operator,
+            input: &self.units.0,
+            target: &self.units.1,
+        };
+        operator.demonstrate(target)
+    }
+}
+
+fn weights_sha256(trained: &Trained) -> String {
+    let nets = [&trained.networks.f, &trained.networks.g];
+    let arrays = nets.iter().flat_map(|net| net.arrays());
+    let data: Vec<f32> = arrays.flatten().copied().collect();
+    let all = Matrix::from_vec(1, data.len(), data).unwrap();
+    crate::data::sha256(&[&all])
+}
+
+/// The digests are those of the first version that had these schedules: what moves in the code moves no bit of a map.
+#[test]
+fn a_seed_gives_the_bits_that_it_always_gave() {
+    let (q, x) = samples();
+    let mut trainer = Trainer::new(&q, &x, &short(3)).unwrap();
+    let plane = train(&mut trainer, &mut above()).unwrap();
+    let (q, x, settings, mut operator) = hand_task();
+    let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
+    let hand = train(&mut trainer, &mut operator).unwrap();
+    assert_eq!(
+        [plane, hand].map(|t| weights_sha256(&t)),
+        [
+            "346db88597ac8beb6b14047df6e6ce96263df6cd5741915838a074a54d60039d",
+            "b0b687721ebaed5cb69787263b660539e3b4d6c0f328321fa09b6fb0c8b9f0e0"
+        ]
+    );
+}
+
+#[test]
+fn a_training_waits_for_its_pairs_and_may_be_left_while_it_waits() {
+    let (q, x) = samples();
+    let settings = short(3);
+    let mut whole = Trainer::new(&q, &x, &settings).unwrap();
+    let want = flat(&train(&mut whole, &mut above()).unwrap());
+    let mut trainer = Trainer::new(&q, &x, &settings).unwrap();
+    assert!(matches!(trainer.show(&[0.0; 3]), Err(Error::Unasked)));
+    let mut asked = Vec::new();
+    loop {
+        match trainer.advance(7).unwrap() {
+            Advance::Trained => {}
+            Advance::NeedsPair(target) => {
+                // It asks for the same as long as nobody answers, and after it was left there, too.
+                assert_eq!(
+                    trainer.advance(7).unwrap(),
+                    Advance::NeedsPair(target.clone())
+                );
+                let kept = trainer.checkpoint().unwrap();
+                trainer = Trainer::new(&q, &x, &settings).unwrap();
+                trainer.resume(&kept).unwrap();
+                assert_eq!(
+                    trainer.advance(7).unwrap(),
+                    Advance::NeedsPair(target.clone())
+                );
+                assert!(matches!(
+                    trainer.show(&[f32::NAN; 3]),
+                    Err(Error::Answer { .. })
+                ));
+                trainer
+                    .show(&above().demonstrate(&target).unwrap())
+                    .unwrap();
+                asked.push(trainer.epoch());
+            }
+            Advance::Done => break,
+        }
+    }
+    assert_eq!(asked, [10, 20, 30]);
+    assert_eq!(flat(&trainer.trained()), want);
+    assert_eq!(trainer.advance(7).unwrap(), Advance::Done);
+}
+
+#[test]
+fn a_fingerprint_is_of_every_setting_that_decides_and_of_nothing_else() {
+    let settings = short(3);
+    let mut others = vec![settings.clone(); 7];
+    others[0].seed += 1;
+    others[1].hidden += 1;
+    others[2].cost = Cost::Pin;
+    others[3].lambda.alpha = 0.0;
+    others[4].initialisation = crate::network::Initialisation::Normal(0.5);
+    others[5].schedule = Schedule::Custom(settings.schedule.plan().with_last_epochs(121));
+    others[6].pairs = PairPlan::Adaptive {
+        start: Pairs::default(),
+        count: 4,
+    };
+    let mut prints: Vec<String> = others.iter().map(Settings::fingerprint).collect();
+    prints.push(settings.fingerprint());
+    prints.sort();
+    prints.dedup();
+    assert_eq!(prints.len(), 8);
+    let same = Settings {
+        threads: 9,
+        answers: Some("true pairs".into()),
+        ..settings.clone()
+    };
+    assert_eq!(same.fingerprint(), settings.fingerprint());
 }

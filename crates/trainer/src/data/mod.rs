@@ -34,6 +34,13 @@ pub struct Matrix {
     pub data: Vec<f32>,
 }
 
+impl From<&Matrix> for Vec<Vec<f32>> {
+    /// Sample after sample.
+    fn from(samples: &Matrix) -> Self {
+        samples.iter_rows().map(<[f32]>::to_vec).collect()
+    }
+}
+
 impl Matrix {
     /// All zeros.
     #[must_use]

@@ -1,15 +1,18 @@
 //! The figures: which trainings go into which drawing.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
+use charts::{Chart, Drawing, Panel, charts, panels};
+use paper::figure::{fold_share, heat, over_epochs, over_pairs, shapes, snapshots};
+use paper::printed::MEASURES;
+use paper::shapes::ShapePair;
+use paper::{Cell, Kept, Source};
 use serde_json::{Value, json};
 use trainer::data::{write_pairs, write_samples};
-use trainer::figures::{Chart, Panel, charts, panels};
-use trainer::reproduce::figure::{fold_share, heat, over_epochs, over_pairs, shapes, snapshots};
-use trainer::reproduce::paper::MEASURES;
-use trainer::reproduce::{Cell, Kept, Source};
-use trainer::shapes::ShapePair;
 
 use super::Bench;
+use super::tables::save;
 use super::what::{APPENDIX, What};
 use crate::failure::told;
 
@@ -69,27 +72,33 @@ impl Bench<'_> {
                 ..chart
             })
             .collect();
-        let path = self.folder.join(format!("{}.svg", what.name()));
-        charts(&path, &drawn).map_err(told)?;
-        Ok(self.wrote(
-            what,
-            &[path.clone(), path.with_extension("csv")],
-            Value::Null,
-        ))
+        let files = self.save(what, charts(&drawn))?;
+        Ok(self.wrote(what, &files, Value::Null))
     }
 
     pub(super) fn panels(&self, what: What, rows: &[Vec<Panel>], more: Value) -> Result<Value> {
-        let path = self.folder.join(format!("{}.svg", what.name()));
-        panels(&path, rows).map_err(told)?;
-        Ok(self.wrote(what, &[path.clone(), path.with_extension("csv")], more))
+        let files = self.save(what, panels(rows))?;
+        Ok(self.wrote(what, &files, more))
+    }
+
+    /// Writes a drawing and its data.
+    pub(super) fn save(
+        &self,
+        what: What,
+        drawing: Result<Drawing, charts::Error>,
+    ) -> Result<Vec<PathBuf>> {
+        let Drawing { svg, csv } = drawing.map_err(told)?;
+        let files = [("svg", svg), ("csv", csv)].map(|(ending, text)| {
+            let file = self.folder.join(format!("{}.{ending}", what.name()));
+            save(&file, &text).map(|()| file)
+        });
+        files.into_iter().collect()
     }
 
     /// Figure 1, and the samples of the shapes as files that `train` takes.
     fn shapes(&self, what: What) -> Result<Value> {
         let rows = shapes(&self.laboratory).map_err(told)?;
-        let path = self.folder.join("fig1.svg");
-        panels(&path, &rows).map_err(told)?;
-        let mut files = vec![path.clone(), path.with_extension("csv")];
+        let mut files = self.save(what, panels(&rows))?;
         let mut known = Vec::new();
         for pair in ShapePair::ALL {
             let domains = self.laboratory.shape(pair).map_err(told)?;

@@ -3,16 +3,16 @@
 use std::fmt::Write as _;
 
 use anyhow::Result;
+use charts::hand_gripper::{gripper, hand, key};
+use charts::{Sketch, sketches};
 use glove::hand::{JOINT_COUNT, JOINT_NAMES};
+use paper::figure::{Shown, principal};
+use paper::{Cell, Kept};
 use serde_json::{Value, json};
 use trainer::data::Matrix;
-use trainer::figures::{Sketch, sketches};
-use trainer::reproduce::figure::{Shown, principal};
-use trainer::reproduce::{Cell, Kept};
-use trainer::table3::POSES;
+use trainer::hand::table3::POSES;
 
 use super::Bench;
-use super::drawings::{gripper, hand, key};
 use super::what::What;
 use crate::failure::told;
 use crate::poses::Motion;
@@ -74,7 +74,7 @@ impl Bench<'_> {
             let _ = writeln!(csv, "{},\"{like}\",{},{}", number + 1, joined(q), joined(x));
             names.push(json!({ "target": x, "like": like }));
         }
-        self.sketches(what, &[hands, grippers], &csv, json!(names))
+        self.sketches(what, &[hands, grippers], csv, json!(names))
     }
 
     /// Figure 12: six seconds of motion, every second of the 25 poses drawn.
@@ -109,7 +109,7 @@ impl Bench<'_> {
             ]
         };
         let [first, second] = [half(0..=12), half(12..=24)];
-        self.sketches(what, &[first, second].concat(), &csv, Value::Null)
+        self.sketches(what, &[first, second].concat(), csv, Value::Null)
     }
 
     /// Figure 13.
@@ -157,10 +157,15 @@ impl Bench<'_> {
         self.panels(what, &[vec![hands, grippers]], Value::Null)
     }
 
-    fn sketches(&self, what: What, rows: &[Vec<Sketch>], csv: &str, more: Value) -> Result<Value> {
-        let path = self.folder.join(format!("{}.svg", what.name()));
-        sketches(&path, rows, &key(), csv).map_err(told)?;
-        Ok(self.wrote(what, &[path.clone(), path.with_extension("csv")], more))
+    fn sketches(
+        &self,
+        what: What,
+        rows: &[Vec<Sketch>],
+        csv: String,
+        more: Value,
+    ) -> Result<Value> {
+        let files = self.save(what, sketches(rows, &key(), csv))?;
+        Ok(self.wrote(what, &files, more))
     }
 
     /// The six seconds in which most happens: of motion that did not train, or of the whole recording.

@@ -1,6 +1,5 @@
 //! `gauntlet reproduce`: the paper's tables and figures. Trainings that are done are kept, so that a run that was stopped goes on.
 
-mod drawings;
 mod figures;
 mod hand_figures;
 mod tables;
@@ -12,11 +11,11 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 use glove::hand::LIMITS;
+use paper::{Laboratory, Source, Store};
 use serde_json::{Value, json};
 use trainer::algorithm;
 use trainer::network::Initialisation;
 use trainer::optimizer::LearningRate;
-use trainer::reproduce::{Laboratory, Source, Store};
 
 use super::train::{Schedule, deviation};
 use crate::failure::{OrFail, told};

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use anyhow::Result;
+use paper::printed::MEASURES;
+use paper::shapes::ShapePair;
+use paper::{Cell, Entry, Kept, Source, Table, printed};
 use serde_json::{Value, json};
-use trainer::reproduce::paper::MEASURES;
-use trainer::reproduce::{Cell, Entry, Kept, Source, Table, paper};
-use trainer::shapes::ShapePair;
 use trainer::whole_file;
 
 use super::Bench;
@@ -152,7 +152,7 @@ fn tests(table: &Table) -> String {
     let Source::Shape(pair) = table.source else {
         return String::new();
     };
-    let papers = paper::P_VALUES[pair as usize];
+    let papers = printed::P_VALUES[pair as usize];
     let mut text = String::new();
     let against = ["‖J‖² + Pin + BA", "Pin + BA"];
     for ((test, other), paper) in table.tests.iter().zip(against).zip(papers) {
@@ -254,8 +254,8 @@ pub(super) fn save(path: &Path, text: &str) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trainer::reproduce::paper::Printed;
-    use trainer::reproduce::stats::summary;
+    use paper::printed::Printed;
+    use paper::stats::summary;
 
     #[test]
     fn a_number_that_the_paper_lost_is_a_dash_and_a_median_outside_is_marked() {

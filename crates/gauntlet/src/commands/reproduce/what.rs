@@ -1,10 +1,10 @@
 //! The tables and figures by name, and the trainings that each of them needs.
 
 use clap::ValueEnum;
+use paper::shapes::ShapePair;
+use paper::{Cell, Row, Source, Table};
 use trainer::algorithm::Schedule;
 use trainer::network::Initialisation;
-use trainer::reproduce::{Cell, Row, Source, Table};
-use trainer::shapes::ShapePair;
 
 /// A table or a figure of the paper. Figures 7 and 8 show a hand's bones and the hardware: nothing to compute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]

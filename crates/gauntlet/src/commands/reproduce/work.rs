@@ -5,7 +5,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anyhow::Result;
-use trainer::reproduce::{Cell, Error, Kept, Laboratory, Store, Watch, run_all};
+use paper::{Cell, Error, Kept, Laboratory, Store, Watch, run_all};
 
 use super::what::{Frame, What};
 use crate::failure::{Failure, told};

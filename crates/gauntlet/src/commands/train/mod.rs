@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use serde_json::{Value, json};
+use trainer::hand::table3::POSES;
 use trainer::model::Model;
 use trainer::network::Initialisation;
-use trainer::table3::POSES;
 
 pub(in crate::commands) use args::deviation;
 pub use args::{CoverageArgs, PairChoice, PairKind, Schedule, Train};

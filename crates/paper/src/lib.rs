@@ -1,21 +1,24 @@
 //! The paper's experiments as a list of cells: a data set, a row of Table 1, a number of pairs, a seed and a schedule. A cell is
-//! trained and measured by the [`Laboratory`], kept by the [`Store`], and set beside the paper's numbers by [`paper`] and [`stats`].
+//! trained and measured by the [`Laboratory`], kept by the [`Store`], and set beside the paper's numbers by [`printed`] and [`stats`].
 
 pub mod figure;
 mod laboratory;
-pub mod paper;
+mod principal;
+pub mod printed;
+pub mod shapes;
 pub mod stats;
 mod store;
 mod table;
 
-pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch, gripper_samples};
+pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch};
+pub use principal::Principal;
 pub use store::{Kept, Store, run_all};
 pub use table::{Entry, Order, Table, number};
 
-use crate::algorithm::{Plan, Schedule};
-use crate::cost::Cost;
-use crate::network::Initialisation;
 use crate::shapes::ShapePair;
+use trainer::algorithm::{Plan, Schedule};
+use trainer::cost::Cost;
+use trainer::network::Initialisation;
 
 /// Where the samples come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -239,7 +242,7 @@ impl Cell {
     pub fn slug(&self) -> String {
         let schedule = match self.schedule {
             Schedule::Paper => "paper".to_owned(),
-            Schedule::Fast | Schedule::Custom(_) => self.plan().slug(),
+            Schedule::Fast | Schedule::Custom(_) => slug(&self.plan()),
         };
         let start = match self.initialisation {
             Initialisation::Glorot => String::new(),
@@ -256,6 +259,21 @@ impl Cell {
     }
 }
 
+/// All a plan's numbers, fit for a file's name.
+fn slug(plan: &Plan) -> String {
+    format!(
+        "{}x{}-{}x{}-{}-{}-{}-{}",
+        plan.stage_epochs,
+        plan.last_epochs,
+        plan.stage_rate,
+        plan.rate.initial,
+        plan.ramp_start,
+        plan.ramp_epochs,
+        plan.cooling_epochs,
+        plan.batches
+    )
+}
+
 /// What can go wrong in a reproduction.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -264,18 +282,18 @@ pub enum Error {
     Shapes(#[from] crate::shapes::Singular),
     /// The operator.
     #[error(transparent)]
-    Operator(#[from] crate::operator::Error),
+    Operator(#[from] trainer::operator::Error),
     /// The training.
     #[error("{cell}: {source}")]
     Training {
         /// The cell.
         cell: String,
         /// What happened.
-        source: crate::algorithm::Error,
+        source: trainer::algorithm::Error,
     },
     /// The model file of a kept cell.
     #[error(transparent)]
-    Model(#[from] crate::model::Error),
+    Model(#[from] trainer::model::Error),
     /// The folder of kept cells.
     #[error("cannot use {}: {source}; check that the folder exists and that you may write there", path.display())]
     Folder {

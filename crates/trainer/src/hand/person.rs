@@ -5,8 +5,8 @@
 //! percentile; what abduction is left when curl is accounted for (straight line, least squares) is the spread.
 
 use crate::data::Matrix;
-use crate::motion::Posture;
-use crate::motion::joints::{COUNT, Finger, THUMB_FLEXIONS};
+use crate::hand::motion::Posture;
+use crate::hand::motion::joints::{COUNT, Finger, THUMB_FLEXIONS};
 
 /// Share of the frames at each end that count as straight or curled, together or apart.
 const END: f64 = 0.1;

@@ -3,7 +3,6 @@
 use super::Error;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use std::path::Path;
 
 pub(super) type Area<'a> = DrawingArea<SVGBackend<'a>, plotters::coord::Shift>;
 pub(super) type Drawn = Result<(), DrawingAreaErrorKind<std::io::Error>>;
@@ -30,7 +29,6 @@ impl Sheet {
     /// Draws rows of items, each into a field of its own, then what stands beside and below; returns the SVG.
     pub(super) fn draw<T>(
         self,
-        path: &Path,
         rows: &[Vec<T>],
         each: impl for<'a> Fn(&Area<'a>, &T) -> Drawn,
         margins: impl for<'a> Fn(&Area<'a>, &Area<'a>) -> Drawn,
@@ -55,7 +53,7 @@ impl Sheet {
                 margins(&beside, &below)?;
                 root.present()
             };
-            drawn().map_err(|error| Error::draw(path, &error))?;
+            drawn().map_err(|error| Error(error.to_string()))?;
         }
         Ok(svg)
     }

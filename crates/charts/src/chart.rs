@@ -1,10 +1,9 @@
 //! Curves over one axis, several charts on a sheet.
 
 use super::sheet::{Area, Drawn, FONT, Key, Sheet, rgb, text};
-use super::{Error, field, range, write};
+use super::{Drawing, Error, field, range};
 use core::fmt::Write as _;
 use plotters::prelude::*;
-use std::path::Path;
 
 /// A named curve.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,11 +48,11 @@ const TOLD: usize = 6;
 const TITLE: (&str, u32) = (FONT, 17);
 const TEXT: (&str, u32) = (FONT, 14);
 
-/// Draws charts with one legend into `path` (SVG), the data beside it as CSV with the columns chart, curve, x, y.
+/// Draws charts with one legend; their data has the columns chart, curve, x, y.
 ///
 /// # Errors
 /// [`Error`].
-pub fn charts(path: &Path, charts: &[Chart]) -> Result<(), Error> {
+pub fn charts(charts: &[Chart]) -> Result<Drawing, Error> {
     let legend = legend(charts);
     let notes = notes(charts);
     let columns = match charts.len() {
@@ -74,7 +73,7 @@ pub fn charts(path: &Path, charts: &[Chart]) -> Result<(), Error> {
         .map(|row| row.iter().collect())
         .collect();
     let each = |area: &Area<'_>, chart: &&Chart| draw(area, chart, &legend);
-    let svg = sheet.draw(path, &rows, each, |beside, below| {
+    let svg = sheet.draw(&rows, each, |beside, below| {
         if sheet.right > 0 {
             for (place, key) in legend.iter().enumerate() {
                 key.draw(beside, (4, 48 + (LINE as usize * place) as i32), TEXT.1)?;
@@ -98,7 +97,7 @@ pub fn charts(path: &Path, charts: &[Chart]) -> Result<(), Error> {
             }
         }
     }
-    write(path, &svg, &csv)
+    Ok(Drawing { svg, csv })
 }
 
 /// Every curve's name once, in the order in which they come, with its colour: one legend for all charts, beside them, where it hides

@@ -53,14 +53,14 @@ pub fn pairs(operator: &mut dyn Operator, count: usize) -> Result<Pairs, Error> 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::operator::Scripted;
+    use crate::hand::Scripted;
 
     #[test]
     fn every_pose_can_be_taken_by_the_gripper_and_shown_by_the_hand() {
         for pose in POSES {
             assert!(gripper::space::contains(&pose.counts), "{}", pose.name);
         }
-        let mut operator = Scripted::new(&glove::hand::LIMITS);
+        let mut operator = Scripted::new(crate::hand::Space::ThreeFinger, &glove::hand::LIMITS);
         let shown = pairs(&mut operator, 8).unwrap();
         assert_eq!((shown.inputs.rows, shown.inputs.cols), (8, 25));
         assert_eq!(shown.targets.row(7), [0.0, 255.0, 0.0, 130.0]);

@@ -3,9 +3,8 @@
 //! Colours say what moves what: thumb and finger A, index and finger B, ring and little finger and finger C.
 
 use glove::hand::{JOINT_COUNT, Side, segment_orientations};
-use trainer::figures::{Key, Sketch, Stroke};
 
-use crate::record::AXES;
+use super::{Key, Sketch, Stroke};
 
 type Point = [f32; 3];
 type Colour = [u8; 3];
@@ -49,7 +48,8 @@ const DIGITS: [(Point, [f32; 3], Colour); 5] = [
 ];
 
 /// What the colours mean.
-pub(super) fn key() -> Vec<Key> {
+#[must_use]
+pub fn key() -> Vec<Key> {
     [
         ("thumb; finger A", THUMB_A),
         ("index; finger B", INDEX_B),
@@ -68,7 +68,8 @@ fn thumb_rest() -> glove::hand::Quaternion {
 }
 
 /// A right hand seen from the palm's side; 25 angles, radians.
-pub(super) fn hand(angles: &[f32]) -> Sketch {
+#[must_use]
+pub fn hand(angles: &[f32]) -> Sketch {
     let Ok(angles) = <[f32; JOINT_COUNT]>::try_from(angles) else {
         return Sketch::default();
     };
@@ -113,8 +114,9 @@ pub(super) fn hand(angles: &[f32]) -> Sketch {
 }
 
 /// The gripper seen with finger A behind; 4 counts.
-pub(super) fn gripper(counts: &[f32]) -> Sketch {
-    let Ok([a, b, c, scissor]) = <[f32; AXES]>::try_from(counts) else {
+#[must_use]
+pub fn gripper(counts: &[f32]) -> Sketch {
+    let Ok([a, b, c, scissor]) = <[f32; gripper::space::AXES]>::try_from(counts) else {
         return Sketch::default();
     };
     let (wide, deep, low) = (50.0, 38.0, 4.0);
@@ -248,6 +250,7 @@ impl View {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use glove::hand::LIMITS;
 
     fn top(sketch: &Sketch, colour: Colour) -> f64 {
         let strokes = sketch
@@ -286,8 +289,15 @@ mod tests {
                 .into_iter()
                 .all(|(x, y)| (0.0..=1.0).contains(x) && (0.0..=1.0).contains(y))
         };
-        let frames = trainer::motion::Generator::new(&glove::hand::LIMITS, 4).frames(300, 4.0);
-        assert!(frames.iter_rows().all(|row| within(&hand(row))));
+        // Every joint through its range, each at its own pace.
+        for step in 0..300_u16 {
+            let angles: [f32; JOINT_COUNT] = core::array::from_fn(|joint| {
+                let (low, high) = LIMITS[joint];
+                let share = f32::from(step) * (0.37 + 0.11 * joint as f32);
+                low + (high - low) * (share - share.floor())
+            });
+            assert!(within(&hand(&angles)), "{step}: {angles:?}");
+        }
         for count in [0.0, 128.0, 255.0] {
             for scissor in [0.0, 255.0] {
                 assert!(within(&gripper(&[count, 255.0 - count, count, scissor])));

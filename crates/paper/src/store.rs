@@ -2,15 +2,15 @@
 //! all. A reproduction that was stopped goes on where it was.
 
 use super::{Cell, Error, Laboratory, Outcome, Stage, Watch};
-use crate::data::{Matrix, Pairs};
-use crate::measures::Measures;
-use crate::model::Model;
-use crate::network::Network;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::PoisonError;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use trainer::data::{Matrix, Pairs};
+use trainer::measures::Measures;
+use trainer::model::Model;
+use trainer::network::Network;
 
 /// A folder of cells.
 #[derive(Clone, Debug)]
@@ -88,7 +88,7 @@ impl Store {
             source,
         })?;
         let digest = recording.map_or(String::new(), |frames| {
-            crate::data::sha256(&[frames])[..8].to_owned()
+            trainer::data::sha256(&[frames])[..8].to_owned()
         });
         Ok(Self { folder, digest })
     }
@@ -219,7 +219,7 @@ impl Store {
 
     fn write(&self, path: &Path, record: &impl Serialize) -> Result<(), Error> {
         let text = serde_json::to_vec(record).map_err(std::io::Error::other);
-        text.and_then(|text| crate::whole_file::write(path, &text))
+        text.and_then(|text| trainer::whole_file::write(path, &text))
             .map_err(|source| Error::Folder {
                 path: path.to_owned(),
                 source,

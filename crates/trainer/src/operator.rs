@@ -1,17 +1,7 @@
 //! Who answers when Algorithm 1 asks for the input that belongs to a chosen target (line 10: "the operator demonstrates"): a person,
 //! a script that answers as a person would, or the ground truth of synthetic data.
 
-mod person;
-mod scripted;
-
-pub use scripted::Scripted;
-
 use crate::data::{Matrix, Pairs};
-
-/// The gripper's resting pose in counts, finger A, B, C and scissor, that belongs to the open hand.
-pub const OPEN_HAND: [f32; 4] = [0.0, 0.0, 0.0, 130.0];
-/// The gripper's pose in counts that belongs to the fist.
-pub const FIST: [f32; 4] = [255.0, 255.0, 255.0, 130.0];
 
 /// Answers with the input that should be mapped to a target. Both are in the units of their domain (radians, counts), not in
 /// network units.
@@ -61,7 +51,7 @@ pub enum Error {
 }
 
 /// Refuses a target of the wrong length or with a value that is not finite.
-fn check(target: &[f32], expected: usize) -> Result<(), Error> {
+pub(crate) fn check(target: &[f32], expected: usize) -> Result<(), Error> {
     if target.len() != expected {
         return Err(Error::Shape {
             found: target.len(),
@@ -75,21 +65,6 @@ fn check(target: &[f32], expected: usize) -> Result<(), Error> {
         }),
         None => Ok(()),
     }
-}
-
-/// The two pairs that start a person's session: the open hand and the fist, as `operator` shows them. With the paper's empty start
-/// set an open hand need not end as an open gripper.
-///
-/// # Errors
-/// Those of the operator.
-pub fn start_pairs(operator: &mut dyn Operator) -> Result<Pairs, Error> {
-    let mut pairs = Pairs::default();
-    for target in [OPEN_HAND, FIST] {
-        let shown = operator.demonstrate(&target)?;
-        pairs.inputs.push(&shown);
-        pairs.targets.push(&target);
-    }
-    Ok(pairs)
 }
 
 /// Answers from ground truth: the input of the pair whose target is nearest. With equal distances the first pair answers.

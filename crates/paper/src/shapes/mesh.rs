@@ -1,7 +1,7 @@
 //! The grid nodes inside a shape, and a triangle mesh of nodes and outline (Delaunay, by Bowyer and Watson's insertion).
 
 use super::curve::{Curve, Point};
-use crate::random::Random;
+use trainer::random::Random;
 
 /// Nodes along a side of the box.
 pub const NODES: usize = 49;

@@ -1,12 +1,10 @@
 //! Grids, clouds and marks in the plane or in space: shapes, the image of a map, its folds.
 
 use super::sheet::{Area, Drawn, FONT, GREY, KEY_LINE, Key, Sheet, centred, rgb, text};
-use super::{Error, field, range, write};
-use crate::data::Matrix;
+use super::{Drawing, Error, Points, field, range};
 use core::fmt::Write as _;
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
-use std::path::Path;
 
 /// Colours of what a panel shows.
 pub const POINTS: [u8; 3] = [40, 80, 140];
@@ -21,7 +19,7 @@ pub const PATH: [u8; 3] = [20, 20, 20];
 #[derive(Clone, Debug, Default)]
 pub struct Net {
     /// The points.
-    pub points: Matrix,
+    pub points: Points,
     /// Column and row of each of them.
     pub grid: Vec<[usize; 2]>,
 }
@@ -51,7 +49,7 @@ pub struct Panel {
     /// Above the drawing.
     pub title: String,
     /// Points of the grid.
-    pub points: Matrix,
+    pub points: Points,
     /// Column and row of each of them: neighbours are joined by lines. Empty: dots.
     pub grid: Vec<[usize; 2]>,
     /// A value 0 to 1 a point, drawn as colour from blue to red.
@@ -59,19 +57,19 @@ pub struct Panel {
     /// Below the drawing; after the colours from first to last when points have values.
     pub note: String,
     /// Points of a closed line behind the grid.
-    pub outline: Matrix,
+    pub outline: Points,
     /// Dots behind the grid.
-    pub cloud: Matrix,
+    pub cloud: Points,
     /// Faint lines behind the points.
     pub net: Net,
     /// Points with a number beside them, from 1 on.
-    pub marks: Matrix,
+    pub marks: Points,
     /// Points joined by a line, in their order.
-    pub path: Matrix,
+    pub path: Points,
     /// Words beside the first and the last point of the path.
     pub path_ends: [String; 2],
     /// Points that must find room though they are not drawn: panels with the same room have the same scale.
-    pub room: Matrix,
+    pub room: Points,
     /// Names of the three axes, drawn in a corner; empty: none.
     pub axes: Vec<String>,
     /// Of points in space.
@@ -87,19 +85,22 @@ const LARGE: (u32, u32) = (460, 500);
 const TITLE: u32 = 30;
 const NOTE: u32 = 24;
 
-/// Draws rows of panels into `path` (SVG), the data beside it as CSV with the columns panel, kind, number, x, y, z, value.
+/// Draws rows of panels; their data has the columns panel, kind, number, x, y, z, value.
 ///
 /// # Errors
 /// [`Error`].
-pub fn panels(path: &Path, rows: &[Vec<Panel>]) -> Result<(), Error> {
+pub fn panels(rows: &[Vec<Panel>]) -> Result<Drawing, Error> {
     let has_keys = rows.iter().flatten().any(|panel| !panel.key.is_empty());
     let sheet = Sheet {
         size: if has_keys { LARGE } else { SIZE },
         right: 0,
         below: 0,
     };
-    let svg = sheet.draw(path, rows, draw, |_, _| Ok(()))?;
-    write(path, &svg, &data(rows))
+    let svg = sheet.draw(rows, draw, |_, _| Ok(()))?;
+    Ok(Drawing {
+        svg,
+        csv: data(rows),
+    })
 }
 
 fn data(rows: &[Vec<Panel>]) -> String {
@@ -113,7 +114,7 @@ fn data(rows: &[Vec<Panel>]) -> String {
             ("mark", &panel.marks),
             ("path", &panel.path),
         ] {
-            for (number, row) in samples.iter_rows().enumerate() {
+            for (number, row) in samples.iter().enumerate() {
                 let axis = |k: usize| row.get(k).map_or(String::new(), f32::to_string);
                 let value = panel.heat.get(number).filter(|_| kind == "point");
                 let _ = writeln!(
@@ -146,8 +147,8 @@ struct Seen {
 
 impl Seen {
     fn of(panel: &Panel) -> Self {
-        let flat = |samples: &Matrix| -> Vec<(f64, f64)> {
-            samples.iter_rows().map(|row| panel.view.of(row)).collect()
+        let flat = |samples: &Points| -> Vec<(f64, f64)> {
+            samples.iter().map(|row| panel.view.of(row)).collect()
         };
         let mut outline = flat(&panel.outline);
         outline.extend(outline.first().copied());

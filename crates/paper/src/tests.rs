@@ -1,8 +1,8 @@
 //! Small cells through the laboratory and the store.
 
 use super::*;
-use crate::algorithm::{Plan, Schedule};
 use std::sync::atomic::{AtomicUsize, Ordering};
+use trainer::algorithm::{Plan, Schedule};
 
 /// A training that takes no time.
 fn short() -> Schedule {
@@ -182,7 +182,7 @@ fn stages_end_with_one_pair_more_each_and_the_last_is_the_trained_map() {
     let store = Store::open(folder.path(), None).unwrap();
     let panels = figure::snapshots((&laboratory, &store), &cell, &|| false).unwrap();
     assert_eq!(
-        (panels.len(), panels[2].points.rows, panels[2].marks.rows),
+        (panels.len(), panels[2].points.len(), panels[2].marks.len()),
         (3, 952, 2)
     );
     // Kept to the last bit: a laboratory that may not work finds them.
@@ -196,7 +196,7 @@ fn stages_end_with_one_pair_more_each_and_the_last_is_the_trained_map() {
 fn curves_are_means_over_the_repetitions() {
     let source = Source::Generated;
     let done = |seed: u64, pairs: usize, vo: f64| {
-        let measures = crate::measures::Measures {
+        let measures = trainer::measures::Measures {
             distortion: 1.0,
             occupancy: Some(vo),
             dissimilarity: 500.0,
@@ -209,7 +209,7 @@ fn curves_are_means_over_the_repetitions() {
         let kept = Kept {
             measures,
             trace: vec![(100, measures), (200, measures)],
-            pairs: crate::data::Pairs::default(),
+            pairs: trainer::data::Pairs::default(),
             seconds: 0.0,
         };
         (cell, kept)

@@ -1,11 +1,11 @@
 //! Tables 2 and 4: our numbers over the repetitions beside the paper's, what lies outside the known ranges, and the t-tests of §3.2.3.
 
-use super::paper::{self, Printed};
+use super::printed::{self, Printed};
 use super::stats::{Summary, TTest, paired_t_test, summary};
 use super::{Cell, Kept, Row, Source};
-use crate::algorithm::Schedule;
-use crate::measures::Measures;
 use crate::shapes::ShapePair;
+use trainer::algorithm::Schedule;
+use trainer::measures::Measures;
 
 /// One number of a table.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,8 +72,8 @@ impl Table {
         let rows = Row::TABLE.map(|row| {
             let entry = |measure| Entry {
                 ours: summary(&values(row, measure)),
-                paper: paper::printed(source, row, measure),
-                range: paper::range(source, row, measure),
+                paper: printed::printed(source, row, measure),
+                range: printed::range(source, row, measure),
             };
             (row, [0, 1, 2, 3].map(entry))
         });
@@ -159,7 +159,7 @@ pub fn number(measures: &Measures, which: usize) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Pairs;
+    use trainer::data::Pairs;
 
     fn kept(distortion: f64) -> Kept {
         Kept {

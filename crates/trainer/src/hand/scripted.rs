@@ -2,20 +2,21 @@
 //! finger B, ring and little finger C with the middle finger between its neighbours; spread fingers mean a low scissor count, a
 //! gathered pinch a high one.
 
+use super::Space;
 use super::person::Person;
-use super::{Error, Operator, check};
+use super::space::NEUTRAL_SCISSOR;
 use crate::data::Matrix;
-use crate::motion::joints::COUNT;
-use crate::motion::{Posture, within};
+use crate::hand::motion::joints::COUNT;
+use crate::hand::motion::{Posture, within};
+use crate::operator::{Error, Operator, check};
 
 /// Counts of a closed finger, and of the scissor in a pinch.
 const FULL: f32 = 255.0;
-/// Scissor counts of the hand that is neither spread nor gathered.
-const NEUTRAL_SCISSOR: f32 = 130.0;
 
-/// The scripted operator: 4 gripper counts in, 25 joint angles out, continuous in the counts.
+/// The scripted operator: a gripper's counts in, 25 joint angles out, continuous in the counts.
 #[derive(Clone, Debug)]
 pub struct Scripted {
+    space: Space,
     limits: [(f32, f32); COUNT],
     person: Option<Person>,
 }
@@ -23,8 +24,9 @@ pub struct Scripted {
 impl Scripted {
     /// Answers with the postures of the motion generator, within `limits` (radians).
     #[must_use]
-    pub fn new(limits: &[(f32, f32); COUNT]) -> Self {
+    pub fn new(space: Space, limits: &[(f32, f32); COUNT]) -> Self {
         Self {
+            space,
             limits: *limits,
             person: None,
         }
@@ -35,7 +37,7 @@ impl Scripted {
     ///
     /// # Errors
     /// [`Error::Nothing`] without a frame, [`Error::Shape`] when a frame has not 25 angles.
-    pub fn for_recording(frames: &Matrix) -> Result<Self, Error> {
+    pub fn for_recording(space: Space, frames: &Matrix) -> Result<Self, Error> {
         if frames.rows == 0 {
             return Err(Error::Nothing {
                 what: "recorded frame",
@@ -50,6 +52,7 @@ impl Scripted {
         let mut limits = [(0.0, 0.0); COUNT];
         limits.copy_from_slice(&frames.ranges());
         Ok(Self {
+            space,
             limits,
             person: Some(Person::from_frames(frames)),
         })
@@ -58,14 +61,23 @@ impl Scripted {
 
 impl Operator for Scripted {
     fn demonstrate(&mut self, target: &[f32]) -> Result<Vec<f32>, Error> {
-        check(target, 4)?;
-        let posture = posture_for([target[0], target[1], target[2], target[3]]);
+        check(target, self.space.axes())?;
+        let posture = match *target {
+            [a, b, c, scissor] => posture_for([a, b, c, scissor]),
+            // The whole hand closes with one axis.
+            _ => one_axis(target[0] / FULL),
+        };
         let shown = match &self.person {
             Some(person) => person.show(&posture),
             None => posture.angles(),
         };
         Ok(within(shown, &self.limits).to_vec())
     }
+}
+
+/// Thumb and all fingers curl together.
+fn one_axis(curl: f32) -> Posture {
+    Posture::from_array([curl, curl, curl, curl, curl, 0.0])
 }
 
 /// The posture that a person would take for these counts.
@@ -83,9 +95,10 @@ fn posture_for([a, b, c, scissor]: [f32; 4]) -> Posture {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::motion::Generator;
-    use crate::motion::joints::{Finger, THUMB_MCP_FLEX};
-    use crate::operator::{FIST, OPEN_HAND};
+    use crate::hand::motion::Generator;
+    use crate::hand::motion::joints::{Finger, THUMB_MCP_FLEX};
+    const OPEN_HAND: [f32; 4] = [0.0, 0.0, 0.0, NEUTRAL_SCISSOR];
+    const FIST: [f32; 4] = [255.0, 255.0, 255.0, NEUTRAL_SCISSOR];
 
     const LIMITS: [(f32, f32); COUNT] = glove::hand::LIMITS;
 
@@ -96,14 +109,14 @@ mod tests {
     #[test]
     fn the_start_pairs_are_the_flat_hand_and_the_fist() {
         let generator = Generator::new(&LIMITS, 1);
-        let mut operator = Scripted::new(&LIMITS);
+        let mut operator = Scripted::new(Space::ThreeFinger, &LIMITS);
         assert_eq!(show(&mut operator, OPEN_HAND), generator.flat_hand());
         assert_eq!(show(&mut operator, FIST), generator.fist());
     }
 
     #[test]
     fn each_gripper_finger_has_its_digit_and_leaves_the_others() {
-        let mut operator = Scripted::new(&LIMITS);
+        let mut operator = Scripted::new(Space::ThreeFinger, &LIMITS);
         let thumb = show(&mut operator, [255.0, 0.0, 0.0, 130.0]);
         assert!(thumb[THUMB_MCP_FLEX] > 0.8 && thumb[Finger::Index.pip_flex()] == 0.0);
         let index = show(&mut operator, [0.0, 255.0, 0.0, 130.0]);
@@ -115,7 +128,7 @@ mod tests {
 
     #[test]
     fn a_low_scissor_is_a_spread_hand_and_a_high_one_a_gathered_one() {
-        let mut operator = Scripted::new(&LIMITS);
+        let mut operator = Scripted::new(Space::ThreeFinger, &LIMITS);
         let mut apart = |scissor| {
             let angles = show(&mut operator, [0.0, 0.0, 0.0, scissor]);
             angles[Finger::Index.mcp_abd()] - angles[Finger::Little.mcp_abd()]
@@ -131,8 +144,8 @@ mod tests {
     fn answers_are_continuous_and_within_the_limits() {
         let frames = Generator::new(&LIMITS, 3).frames(635, 9.2);
         for mut operator in [
-            Scripted::new(&LIMITS),
-            Scripted::for_recording(&frames).unwrap(),
+            Scripted::new(Space::ThreeFinger, &LIMITS),
+            Scripted::for_recording(Space::ThreeFinger, &frames).unwrap(),
         ] {
             let mut before: Option<[f32; COUNT]> = None;
             for step in 0..=2550_u16 {
@@ -157,7 +170,7 @@ mod tests {
         for value in &mut frames.data {
             *value *= 0.5;
         }
-        let mut operator = Scripted::for_recording(&frames).unwrap();
+        let mut operator = Scripted::for_recording(Space::ThreeFinger, &frames).unwrap();
         let open = show(&mut operator, OPEN_HAND)[Finger::Index.pip_flex()];
         let fist = show(&mut operator, FIST)[Finger::Index.pip_flex()];
         assert!(
@@ -169,13 +182,13 @@ mod tests {
     #[test]
     fn a_recording_without_motion_or_without_frames_does_not_panic() {
         let still = Matrix::from_rows(&[[0.3; COUNT]; 4]);
-        let mut operator = Scripted::for_recording(&still).unwrap();
+        let mut operator = Scripted::for_recording(Space::ThreeFinger, &still).unwrap();
         assert!(
             show(&mut operator, FIST)
                 .iter()
                 .all(|a| (a - 0.3).abs() < 1e-5)
         );
-        assert!(Scripted::for_recording(&Matrix::default()).is_err());
-        assert!(Scripted::for_recording(&Matrix::zeros(3, 24)).is_err());
+        assert!(Scripted::for_recording(Space::ThreeFinger, &Matrix::default()).is_err());
+        assert!(Scripted::for_recording(Space::ThreeFinger, &Matrix::zeros(3, 24)).is_err());
     }
 }

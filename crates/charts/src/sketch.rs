@@ -1,9 +1,8 @@
 //! Line drawings that others make (of hands and grippers, say), laid out in rows with a title each.
 
 use super::sheet::{Area, Drawn, GREY, Key, Sheet, centred, rgb};
-use super::{Error, write};
+use super::{Drawing, Error};
 use plotters::prelude::*;
-use std::path::Path;
 
 /// A line or a filled outline.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,23 +39,23 @@ const NOTE: u32 = 22;
 /// Room for one word of the key.
 const WORD: i32 = 200;
 
-/// Draws rows of sketches and, below, what their colours mean into `path` (SVG), `csv` beside it.
+/// Draws rows of sketches and, below, what their colours mean. Their data is `csv`.
 ///
 /// # Errors
 /// [`Error`].
-pub fn sketches(path: &Path, rows: &[Vec<Sketch>], key: &[Key], csv: &str) -> Result<(), Error> {
+pub fn sketches(rows: &[Vec<Sketch>], key: &[Key], csv: String) -> Result<Drawing, Error> {
     let sheet = Sheet {
         size: SIZE,
         right: 0,
         below: if key.is_empty() { 0 } else { 34 },
     };
-    let svg = sheet.draw(path, rows, draw, |_, below| {
+    let svg = sheet.draw(rows, draw, |_, below| {
         for (place, word) in key.iter().enumerate() {
             word.draw(below, (16 + WORD * place as i32, 15), 13)?;
         }
         Ok(())
     })?;
-    write(path, &svg, csv)
+    Ok(Drawing { svg, csv })
 }
 
 fn draw(area: &Area<'_>, sketch: &Sketch) -> Drawn {

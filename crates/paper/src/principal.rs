@@ -1,6 +1,6 @@
 //! Principal components, for drawing hands and grippers in three dimensions (Figure 13).
 
-use crate::data::Matrix;
+use trainer::data::Matrix;
 
 /// Mean and leading principal axes of some samples.
 #[derive(Clone, Debug, PartialEq)]
@@ -103,4 +103,42 @@ fn leading(matrix: &[Vec<f64>]) -> (Vec<f64>, f64) {
         .iter()
         .map(|v| sign * v / length.max(f64::MIN_POSITIVE));
     (unit.collect(), variance)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use trainer::random::Random;
+
+    #[test]
+    fn principal_axes_are_those_of_the_cloud() {
+        let mut random = Random::new(5, 0);
+        let rows: Vec<[f32; 3]> = (0..2000)
+            .map(|_| {
+                let (a, b, c) = (
+                    3.0 * random.normal(),
+                    random.normal(),
+                    0.1 * random.normal(),
+                );
+                // Long along (1, 1, 0)/√2, then along z, thin along (1, −1, 0)/√2.
+                [(a + c) as f32 + 5.0, (a - c) as f32, b as f32]
+            })
+            .collect();
+        let samples = Matrix::from_rows(&rows);
+        let principal = Principal::of(&samples, 3);
+        let sum: f64 = principal.shares.iter().sum();
+        assert!((sum - 1.0).abs() < 1e-6, "{sum}");
+        assert!(principal.shares[0] > 0.9 && principal.shares[2] < 0.01);
+        let projected = principal.project(&samples);
+        let along = f64::from(projected.row(0)[0]);
+        let mean = samples
+            .iter_rows()
+            .map(|row| f64::from(row[0] + row[1]))
+            .sum::<f64>()
+            / 2000.0;
+        let expected = (f64::from(rows[0][0] + rows[0][1]) - mean) / libm::sqrt(2.0);
+        assert!((along - expected).abs() < 0.05, "{along} {expected}");
+        let still = Principal::of(&Matrix::from_rows(&[[1.0, 2.0]; 3]), 2);
+        assert!(still.project(&samples).data.iter().all(|v| v.is_finite()));
+    }
 }

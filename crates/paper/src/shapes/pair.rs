@@ -3,8 +3,8 @@
 use super::curve::{CLOVER_RADIUS, Curve, Point, Shape};
 use super::harmonic::{Laplacian, Singular};
 use super::mesh::{Mesh, Node, double_area, interior};
-use crate::data::{Matrix, Pairs};
-use crate::random::Random;
+use trainer::data::{Matrix, Pairs};
+use trainer::random::Random;
 
 /// Size of everything, relative to the box: sets the balance of the cost's terms.
 const SIZE: f64 = 2.0;

@@ -1,15 +1,17 @@
 //! Measures training: time a step and a model, quality by data set and schedule.
 //!
-//! `cargo run --release -p trainer --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
-//! data sets: sp1 to sp4, hand (generated motion), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
+//! `cargo run --release -p paper --example bench_train -- quality sp1 fast 5` trains 5 seeds and prints the four measures of each;
+//! data sets: sp1 to sp4, hand (generated motion), hand-1 (for a gripper of one axis), or the path of a recording; schedules: paper, fast, or `name=value,…` with what
 //! differs from the fast one on a plane (`m1`, `m2`, `stage_rate`, `rate`, `decay`, `start`, `ramp`, `cool`, `batches`; see
 //! `trainer::algorithm::Plan`); seeds: `5`, or `6-10`; then threads, and the deviation of initial weights that are normally distributed.
 //! `-- estimate hand fast 3` says how right the estimate of the time left is along the way (words as of `quality`).
 //! `-- speed 2` prints the table of times a step on two threads, with the phases of a step and
 //! how it grows. Without a word it prints all there is about speed, and draws the growth into `target/bench-train`.
 
+use charts::{Chart, Curve};
 use core::ops::ControlFlow;
 use core::ops::RangeInclusive;
+use paper::shapes::ShapePair;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -19,13 +21,12 @@ use trainer::cost::fast::Steps;
 use trainer::cost::reference::Autoencoder;
 use trainer::cost::{Cost, Lambda, Weights};
 use trainer::data::{Matrix, Pairs, Split, split};
-use trainer::figures::{Chart, Curve};
+use trainer::hand::motion::Generator;
+use trainer::hand::{Draw, Scripted, Space, start_pairs};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::Normalisation;
-use trainer::motion::Generator;
 use trainer::network::{Initialisation, Network};
-use trainer::operator::{GroundTruth, Operator, Scripted, start_pairs};
-use trainer::shapes::ShapePair;
+use trainer::operator::{GroundTruth, Operator};
 
 type Result<T> = core::result::Result<T, Box<dyn core::error::Error>>;
 
@@ -74,28 +75,23 @@ fn shape(pair: ShapePair, seed: u64) -> Result<Domain> {
     })
 }
 
-fn hand(recording: Option<&str>, seed: u64) -> Result<Domain> {
+fn hand(space: Space, recording: Option<&str>, seed: u64) -> Result<Domain> {
     let limits = &glove::hand::LIMITS;
     let (frames, mut operator) = match recording {
         None => (
             Generator::new(limits, seed).frames(635, 9.2),
-            Scripted::new(limits),
+            Scripted::new(space, limits),
         ),
         Some(path) => {
             let frames = trainer::data::read_poses(path, &glove::hand::JOINT_NAMES)?.rows;
-            let operator = Scripted::for_recording(&frames)?;
+            let operator = Scripted::for_recording(space, &frames)?;
             (frames, operator)
         }
     };
     let Split { train, test } = split(frames.rows, 0.6, seed);
-    let units = (Normalisation::identity(25), Normalisation::gripper(4));
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut targets = Matrix::default();
-    for _ in 0..8000 {
-        let sample = gripper::space::sample(|| random.random::<f32>());
-        targets.push(&units.1.apply(&sample));
-    }
-    let shown = start_pairs(&mut operator)?;
+    let units = (Normalisation::identity(25), space.units());
+    let targets = units.1.apply_all(&space.samples(8000, seed, Draw::Train));
+    let shown = start_pairs(space, &mut operator)?;
     let start = Pairs {
         inputs: units.0.apply_all(&shown.inputs),
         targets: units.1.apply_all(&shown.targets),
@@ -104,12 +100,23 @@ fn hand(recording: Option<&str>, seed: u64) -> Result<Domain> {
         train: frames.select(&train),
         test: frames.select(&test),
         targets,
-        coverage: Coverage::GRIPPER,
+        coverage: network_units(space.coverage(), &units.1),
         truth: None,
         operator: Box::new(operator),
         units,
         settings: Settings::hand(start, 8, seed),
     })
+}
+
+/// A volume in counts as one in network units, the same on every axis.
+fn network_units(coverage: Coverage, units: &Normalisation) -> Coverage {
+    match coverage {
+        Coverage::Volume { volume, dimension } => Coverage::Volume {
+            volume: volume / f64::from(units.scale[0]).powi(dimension as i32),
+            dimension,
+        },
+        other => other,
+    }
 }
 
 fn domain(name: &str, seed: u64) -> Result<Domain> {
@@ -118,8 +125,9 @@ fn domain(name: &str, seed: u64) -> Result<Domain> {
         "sp2" => shape(ShapePair::Sp2, seed),
         "sp3" => shape(ShapePair::Sp3, seed),
         "sp4" => shape(ShapePair::Sp4, seed),
-        "hand" => hand(None, seed),
-        path => hand(Some(path), seed),
+        "hand-1" => hand(Space::OneAxis, None, seed),
+        "hand" => hand(Space::ThreeFinger, None, seed),
+        path => hand(Space::ThreeFinger, Some(path), seed),
     }
 }
 
@@ -173,7 +181,9 @@ fn train(
         input: &domain.units.0,
         target: &domain.units.1,
     };
-    let trained = trainer.run(&mut operator, &mut |_| ControlFlow::Continue(()))?;
+    let go_on = &mut |_: &mut Trainer| ControlFlow::Continue(());
+    let trained = trainer.train_with(&mut operator, 50, go_on)?;
+    let trained = trained.ok_or("stopped")?;
     let used = processor_seconds()
         .zip(before)
         .map(|(now, then)| now - then);
@@ -200,7 +210,8 @@ fn estimate(name: &str, schedule: Schedule, seed: u64, threads: usize) -> Result
     };
     let start = Instant::now();
     let mut told = Vec::new();
-    trainer.run(&mut operator, &mut |progress| {
+    trainer.train_with(&mut operator, 50, &mut |trainer| {
+        let progress = trainer.progress();
         told.push((
             start.elapsed().as_secs_f64(),
             progress.remaining.as_secs_f64(),
@@ -452,7 +463,9 @@ fn everything(folder: &Path) -> Result<()> {
     let charts: Vec<Chart> = [1, 2].into_iter().flat_map(speed).collect();
     std::fs::create_dir_all(folder)?;
     let drawing = folder.join("training-time.svg");
-    trainer::figures::charts(&drawing, &charts)?;
+    let drawn = charts::charts(&charts)?;
+    std::fs::write(&drawing, drawn.svg)?;
+    std::fs::write(drawing.with_extension("csv"), drawn.csv)?;
     println!("drawn into {}", drawing.display());
     println!("| model | threads | s | processor s | resident MB so far |\n|---|---|---|---|---|");
     for threads in [1, 2] {

@@ -1,23 +1,25 @@
 //! Makes the samples of a cell, trains, measures.
 
 use super::{Cell, Error, Row, Source};
-use crate::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
-use crate::cost::Lambda;
-use crate::data::{self, Matrix, Pairs};
-use crate::measures::{Coverage, Measures, Test, measure};
-use crate::model::{Metadata, Model, Normalisation};
-use crate::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
-use crate::network::Network;
-use crate::operator::{GroundTruth, Operator, Scripted};
-use crate::random::Random;
 use crate::shapes::{Domains, ShapePair, Singular};
-use crate::table3;
 use core::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::time::Instant;
+use trainer::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
+use trainer::cost::Lambda;
+use trainer::data::{self, Matrix, Pairs};
+use trainer::hand::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
+use trainer::hand::table3;
+use trainer::hand::{Draw, Scripted, Space};
+use trainer::measures::{Coverage, Measures, Test, measure};
+use trainer::model::{Metadata, Model, Normalisation};
+use trainer::network::Network;
+use trainer::operator::{GroundTruth, Operator};
 
 /// Target samples of every experiment (§3.2.1, §3.3.2).
 const TARGETS: usize = 8000;
+/// The gripper of the hand's experiments.
+const HAND: Space = Space::ThreeFinger;
 /// Random numbers of the gripper's samples.
 const TARGET_STREAM: u64 = 0x4752_4950;
 
@@ -97,11 +99,11 @@ impl Laboratory {
             Source::Shape(pair) => self.prepare_shape(cell, pair),
             Source::Generated => {
                 let frames = Generator::new(&self.limits, cell.seed).frames(FRAMES, RATE_HZ);
-                prepare_hand(cell, &frames, Scripted::new(&self.limits))
+                prepare_hand(cell, &frames, Scripted::new(HAND, &self.limits))
             }
             Source::Recorded => {
                 let frames = self.recording.as_ref().ok_or(Error::NoRecording)?;
-                prepare_hand(cell, frames, Scripted::for_recording(frames)?)
+                prepare_hand(cell, frames, Scripted::for_recording(HAND, frames)?)
             }
         }
     }
@@ -159,18 +161,8 @@ impl Laboratory {
         loop {
             let start = Instant::now();
             let pause = pause_after(cell.trace_every, trainer.epoch());
-            let step = train_until((&mut trainer, cell), &mut prepared, pause, watch);
+            let done = train_until((&mut trainer, cell), &mut prepared, pause, watch)?;
             seconds += start.elapsed().as_secs_f64();
-            let done = match step {
-                Ok(()) => true,
-                // A stop that was asked for at that very epoch is one.
-                Err(algorithm::Error::Stopped { epoch })
-                    if Some(epoch) == pause && !watch.stop() =>
-                {
-                    false
-                }
-                Err(error) => return Err(fail(error)),
-            };
             if cell.trace_every > 0 {
                 let now = prepared.measure(&trainer.networks().f);
                 trace.push((trainer.epoch(), now));
@@ -211,19 +203,13 @@ impl Laboratory {
     pub fn stages(&self, cell: &Cell, watch: &dyn Watch) -> Result<Vec<Stage>, Error> {
         let mut prepared = self.prepare(cell)?;
         let each = cell.plan().stage_epochs.max(1);
-        prepared.settings.report_every = often(each);
         let fail = |source| failure(cell, source);
         let mut trainer =
             Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
         let mut stages = Vec::new();
         for stage in 0..=cell.pairs {
             let pause = (stage < cell.pairs).then_some((stage + 1) * each);
-            match train_until((&mut trainer, cell), &mut prepared, pause, watch) {
-                Ok(()) => {}
-                Err(algorithm::Error::Stopped { epoch })
-                    if Some(epoch) == pause && !watch.stop() => {}
-                Err(error) => return Err(fail(error)),
-            }
+            train_until((&mut trainer, cell), &mut prepared, pause, watch)?;
             stages.push((trainer.networks().f, trainer.pairs().clone()));
         }
         Ok(stages)
@@ -231,20 +217,19 @@ impl Laboratory {
 }
 
 fn failure(cell: &Cell, source: algorithm::Error) -> Error {
-    match source {
-        algorithm::Error::Stopped { .. } => Error::Stopped,
-        source => Error::Training {
-            cell: cell.slug(),
-            source,
-        },
+    Error::Training {
+        cell: cell.slug(),
+        source,
     }
 }
+
+/// Most epochs between two looks at the clock.
+const MOST_OFTEN: usize = 10;
 
 /// Epochs between two looks at the clock, of which each `pause` epochs are one: few, so that a stop is heard within a second or two
 /// whatever the machine.
 fn often(pause: usize) -> usize {
-    const MOST: usize = 10;
-    (1..=MOST)
+    (1..=MOST_OFTEN)
         .rev()
         .find(|each| pause.is_multiple_of(*each))
         .unwrap_or(1)
@@ -255,32 +240,37 @@ fn pause_after(every: usize, epoch: usize) -> Option<usize> {
     (every > 0).then(|| (epoch / every + 1) * every)
 }
 
-/// Trains to the end, or to `pause`, which shows as [`algorithm::Error::Stopped`] at that epoch.
+/// Trains to the end, or to `pause`; whether that was the end.
 fn train_until(
     (trainer, cell): (&mut Trainer, &Cell),
     prepared: &mut Prepared,
     pause: Option<usize>,
     watch: &dyn Watch,
-) -> Result<(), algorithm::Error> {
+) -> Result<bool, Error> {
     let mut operator = InUnits {
         operator: prepared.operator.as_mut(),
         input: &prepared.units.0,
         target: &prepared.units.1,
     };
-    let total = trainer.total();
     let mut before = trainer.epoch();
-    let trained = trainer.run(&mut operator, &mut |progress| {
+    let each = often(pause.unwrap_or(MOST_OFTEN));
+    let trained = trainer.train_with(&mut operator, each, &mut |trainer| {
+        let progress = trainer.progress();
         let epochs = progress.epoch.saturating_sub(before) as f64;
         before = progress.epoch;
         watch.advance(epochs * cell.epoch_work(progress.weights.attraction > 0.0));
-        let pauses = Some(progress.epoch) == pause && progress.epoch < total;
-        if pauses || watch.stop() {
+        if Some(progress.epoch) == pause || watch.stop() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
     });
-    trained.map(|_| ())
+    let is_done = trained.map_err(|source| failure(cell, source))?.is_some();
+    // A stop that is asked for at a pause is one.
+    if !is_done && watch.stop() {
+        return Err(Error::Stopped);
+    }
+    Ok(is_done)
 }
 
 fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<Prepared, Error> {
@@ -303,23 +293,15 @@ fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<
     Ok(Prepared {
         train: frames.select(&split.train),
         test: frames.select(&split.test),
-        targets: units.1.apply_all(&gripper_samples(TARGETS, cell.seed)),
+        targets: units
+            .1
+            .apply_all(&HAND.samples(TARGETS, cell.seed, Draw::Stream(TARGET_STREAM))),
         truth: None,
         coverage: Coverage::GRIPPER,
         units,
         operator: Box::new(operator),
         settings: settings(cell, plan, Lambda::HAND),
     })
-}
-
-/// `count` poses, uniform in the gripper's configuration space, counts.
-#[must_use]
-pub fn gripper_samples(count: usize, seed: u64) -> Matrix {
-    let mut random = Random::new(seed, TARGET_STREAM);
-    let poses: Vec<[f32; 4]> = (0..count)
-        .map(|_| gripper::space::sample(|| random.unit()))
-        .collect();
-    Matrix::from_rows(&poses)
 }
 
 fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
@@ -333,7 +315,6 @@ fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
         initialisation: cell.initialisation,
         // Cells run side by side: one thread each.
         threads: 1,
-        report_every: often(cell.trace_every),
         ..Settings::shapes(plan, cell.seed)
     }
 }

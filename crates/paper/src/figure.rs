@@ -1,13 +1,14 @@
 //! The paper's figures from cells: Figure 1, the snapshots of Figure 3, curves over epochs (2, 11, 14 to 17) and over the number of
-//! pairs (4, 5, 10, 18, 19), the heat maps of Figure 6, the principal components of Figure 13. Drawn by [`crate::figures`].
+//! pairs (4, 5, 10, 18, 19), the heat maps of Figure 6, the principal components of Figure 13. Drawn by [`charts`].
 
 use super::table::number;
-use super::{Cell, Error, Kept, Laboratory, Row, Source, Store, Watch, paper};
-use crate::data::Matrix;
-use crate::figures::{CLOUD, Chart, Curve, Key, MARKS, Net, PATH, POINTS, Panel, Principal, View};
-use crate::measures::{NEIGHBOURS, dissimilarities};
-use crate::network::Network;
+use super::{Cell, Error, Kept, Laboratory, Row, Source, Store, Watch, printed};
+use crate::principal::Principal;
 use crate::shapes::ShapePair;
+use charts::{CLOUD, Chart, Curve, Key, MARKS, Net, PATH, POINTS, Panel, View};
+use trainer::data::Matrix;
+use trainer::measures::{NEIGHBOURS, dissimilarities};
+use trainer::network::Network;
 
 /// d-Knn above this is drawn as this (Figure 6).
 pub const HEAT_CAP: f64 = 100.0;
@@ -26,10 +27,10 @@ pub fn shapes(laboratory: &Laboratory) -> Result<Vec<Vec<Panel>>, Error> {
         let ten: Vec<usize> = (0..10).map(|i| i * matched / 10).collect();
         let panel = |title: String, points: &Matrix, outline: &Matrix| Panel {
             title,
-            points: points.clone(),
+            points: points.into(),
             grid: domains.grid.clone(),
-            outline: outline.clone(),
-            marks: outline.select(&ten),
+            outline: outline.into(),
+            marks: (&outline.select(&ten)).into(),
             ..Panel::default()
         };
         let (truth, boundary) = (&domains.truth, &domains.boundary);
@@ -69,11 +70,11 @@ pub fn snapshots(
         (snapshots.into_iter().zip(images).enumerate()).map(|(stage, ((_, pairs), points))| {
             Panel {
                 title: format!("{}, session {}", pair.name(), stage + 1),
-                points,
+                points: (&points).into(),
                 grid: domains.grid.clone(),
-                outline: domains.boundary.targets.clone(),
-                marks: pairs.targets,
-                room: room.clone(),
+                outline: (&domains.boundary.targets).into(),
+                marks: (&pairs.targets).into(),
+                room: (&room).into(),
                 ..Panel::default()
             }
         });
@@ -90,7 +91,7 @@ pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Pa
         Source::Shape(pair) => {
             let domains = laboratory.shape(pair)?;
             let net = Net {
-                points: image(f, &domains.truth.inputs),
+                points: (&image(f, &domains.truth.inputs)).into(),
                 grid: domains.grid.clone(),
             };
             (domains.boundary.targets.clone(), net)
@@ -111,8 +112,8 @@ pub fn heat(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Result<Pa
             cell.row.title(),
             cell.seed
         ),
-        points: images,
-        outline,
+        points: (&images).into(),
+        outline: (&outline).into(),
         net,
         heat: each.iter().map(|d| d.min(HEAT_CAP) / HEAT_CAP).collect(),
         note: format!("d-Knn of a held-out node, 0 to ≥ {HEAT_CAP:.0}"),
@@ -232,10 +233,10 @@ pub fn principal(title: &str, shown: &Shown<'_>) -> Panel {
             "the three principal axes (PC) hold {:.0} % of the variance",
             libm::round(100.0 * share)
         ),
-        points: axes.project(shown.points),
-        cloud: axes.project(shown.samples),
-        marks: axes.project(shown.marks),
-        path: axes.project(shown.motion),
+        points: (&axes.project(shown.points)).into(),
+        cloud: (&axes.project(shown.samples)).into(),
+        marks: (&axes.project(shown.marks)).into(),
+        path: (&axes.project(shown.motion)).into(),
         path_ends: shown.ends.map(str::to_owned),
         axes: (1..=axes.shares.len()).map(|i| format!("PC{i}")).collect(),
         view: View {
@@ -269,7 +270,7 @@ fn of(done: &[(Cell, Kept)], source: Source, row: Row) -> impl Iterator<Item = &
 /// A chart a measure; rows and measures without a point are left out.
 fn charts(source: Source, points: impl Fn(Row, usize) -> Vec<(f64, f64)>) -> Vec<Chart> {
     let rows = Row::TABLE.iter().chain(&[Row::HaeFixed]);
-    let charts = paper::MEASURES.iter().enumerate().map(|(measure, name)| {
+    let charts = printed::MEASURES.iter().enumerate().map(|(measure, name)| {
         let curves = rows.clone().map(|&row| {
             let curve = Curve {
                 name: row.title().to_owned(),
@@ -279,7 +280,11 @@ fn charts(source: Source, points: impl Fn(Row, usize) -> Vec<(f64, f64)>) -> Vec
         });
         let (curves, colours) = curves.filter(|(curve, _)| !curve.points.is_empty()).unzip();
         Chart {
-            title: format!("{}: {}", source.title(), paper::MEASURES_IN_WORDS[measure]),
+            title: format!(
+                "{}: {}",
+                source.title(),
+                printed::MEASURES_IN_WORDS[measure]
+            ),
             y_label: (*name).to_owned(),
             // Folds and the first epochs stand out by orders of magnitude.
             logarithmic: measure >= 2 && matches!(source, Source::Shape(_)),
