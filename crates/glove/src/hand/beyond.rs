@@ -19,8 +19,14 @@ pub const NEAR: f32 = 50.0 * core::f32::consts::PI / 180.0;
 /// How many of the five joints on the hand must be impossible for it to be the `hand` sensor's doing.
 const OF_THE_HAND: usize = 3;
 
+/// A hinge turned sideways by less than 30° has at least this much of its rotation about x: the squared cosine of 15°.
+const UPRIGHT: f32 = 0.933;
+
+/// What is left of [`NEAR`] for its angle, radians (20°).
+const REST: f32 = 20.0 * core::f32::consts::PI / 180.0;
+
 /// By how much the joint between each segment and its [`parent`](super::parent) is turned beyond [`LIMITS`], radians; zero
-/// for the hand. `angles` are what [`joint_angles`](super::joint_angles) gave for the same arguments.
+/// for the hand, and where it is surely nearer than [`NEAR`]: no transcendental function is called then. `angles` are what [`joint_angles`](super::joint_angles) gave for the same arguments.
 pub fn excess(
     orientations: &[Quaternion; SEGMENT_COUNT],
     calibration: &Calibration,
@@ -32,8 +38,10 @@ pub fn excess(
     for finger in 0..5 {
         let (joint, first) = (first_joint(finger), first_segment(finger));
         let within: [f32; 5] = core::array::from_fn(|i| within(joint + i, angles[joint + i]));
-        // Most of the time it is within: then there is nothing to compose.
-        if within[..3] != angles[joint..joint + 3] {
+        let over = |i: usize| libm::fabsf(angles[joint + i] - within[i]);
+        // Turned back axis by axis it would be within: it is no farther than that.
+        let base_over = over(0) + over(1) + over(2);
+        if base_over > NEAR {
             let base = segments[0].inverse() * segments[first];
             let sign = side.sign();
             let nearest = rotation::compose(within[0], sign * within[1], sign * within[2]);
@@ -41,6 +49,9 @@ pub fn excess(
         }
         for hinge in 1..3 {
             let turned = segments[first + hinge - 1].inverse() * segments[first + hinge];
+            if turned.w * turned.w + turned.i * turned.i >= UPRIGHT && over(2 + hinge) <= REST {
+                continue;
+            }
             let nearest = rotation::about_x(within[2 + hinge]);
             excess[first + hinge] = angle_between(&turned, &nearest);
         }
