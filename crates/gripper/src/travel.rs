@@ -105,8 +105,8 @@ pub struct Plausibility<const X: usize> {
     speed: Speed,
     /// Nothing seen for this long starts anew.
     restart: Duration,
-    /// The newest positions that can be true; `None` before the first.
-    position: Option<[u8; X]>,
+    /// The newest positions that can be true, and the stamp of their status; `None` before the first.
+    believed: Option<([u8; X], Instant)>,
     /// They have been confirmed by a second status.
     confirmed: bool,
     /// Stamp of the newest status, and what was made of it.
@@ -121,7 +121,7 @@ impl<const X: usize> Plausibility<X> {
         Self {
             speed,
             restart: RESTART,
-            position: None,
+            believed: None,
             confirmed: false,
             newest: None,
             doubts: 0,
@@ -154,23 +154,24 @@ impl<const X: usize> Plausibility<X> {
             newest => newest.map(|(stamp, _)| stamp),
         };
         // A clock that ran backwards says nothing about time passed.
-        let passed = before
+        let gap = before
             .filter(|before| *before < status.stamp)
-            .map(|before| (timing::since(status.stamp, before), before));
+            .map(|before| timing::since(status.stamp, before));
         let judged = matches!(
             status.activation,
             Activation::Ready | Activation::ChangingMode
         );
-        let verdict = match (passed, self.position) {
-            (Some((gap, before)), Some(position)) if judged && gap <= self.restart => self.compare(
+        let verdict = match (gap, self.believed) {
+            (Some(gap), Some((position, since))) if judged && gap <= self.restart => self.compare(
                 status,
                 position,
-                timing::since(now.max(status.stamp), before),
+                // Also the time of statuses that were doubted meanwhile: the axis went on.
+                timing::since(now.max(status.stamp), since),
             ),
             _ => {
                 self.doubts = 0;
                 self.confirmed = false;
-                self.position = judged.then_some(status.position);
+                self.believed = judged.then_some((status.position, status.stamp));
                 Verdict::First
             }
         };
@@ -187,14 +188,15 @@ impl<const X: usize> Plausibility<X> {
             .position(|(here, there)| here.abs_diff(there) > within);
         match far {
             None => {
-                (self.position, self.confirmed, self.doubts) = (Some(status.position), true, 0);
+                self.believed = Some((status.position, status.stamp));
+                (self.confirmed, self.doubts) = (true, 0);
                 Verdict::Used { within }
             }
             Some(axis) => {
                 self.doubts = self.doubts.saturating_add(1);
                 if !self.confirmed {
                     // Nobody knows which of the two is wrong.
-                    self.position = Some(status.position);
+                    self.believed = Some((status.position, status.stamp));
                 }
                 if self.doubts >= DOUBTS {
                     Verdict::Implausible { axis }
@@ -277,6 +279,13 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn an_axis_that_goes_on_while_a_status_is_doubted_is_believed_after_it() {
+        // 181 counts a second, looked at every 100 ms; the third status slipped.
+        let seen = verdicts(Speed::THREE_FINGER, 100_000, &[0, 18, 200, 54, 72]);
+        assert_eq!(seen.as_slice(), ['f', 'u', 'd', 'u', 'u']);
     }
 
     #[test]
