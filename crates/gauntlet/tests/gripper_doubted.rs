@@ -35,7 +35,8 @@ fn moving(family: Family) -> (VirtualGripper, rig::pty::Handle, Child, String) {
     let end = Instant::now() + Duration::from_secs(30);
     while gripper.positions()[0] < 50.0 {
         if let Some(status) = child.try_wait().unwrap() {
-            panic!("it ended with {status} before it moved");
+            let said = text(&finish(child).stderr);
+            panic!("it ended with {status} before it moved: {said}");
         }
         assert!(Instant::now() < end, "it never moved");
         std::thread::sleep(Duration::from_millis(2));

@@ -21,8 +21,11 @@ pub(super) const LEAD: u8 = 40;
 const LEAST_LEAD: u8 = 10;
 /// An axis that has stood for so long is where it says.
 const SURE: gripper::Duration = gripper::Duration::from_millis(200);
-/// Without a status for this long the move is given up.
+/// Without an answer for this long the move is given up.
 pub(super) const SILENCE: Duration = Duration::from_secs(1);
+/// The same without a whole status in time, where answers come: after late ones the driver asks short questions for
+/// [`timing::MEMORY`].
+const NO_STATUS: gripper::Duration = gripper::Duration::from_secs(3);
 /// Nobody looked for this long: what was seen before is of then, and the positions are looked at anew.
 pub(super) const STALL: gripper::Duration = timing::STALE_MOTION;
 /// Nobody looked for this long: whoever began the move may be elsewhere by now, and it ends. As long as a clutch stays
@@ -70,6 +73,8 @@ pub(super) struct Leader<'a, const X: usize> {
     /// What it was told last, to judge by.
     told: Option<[u8; X]>,
     heard: Instant,
+    /// When any answer came last, in time or late, and how many there were.
+    answered: (Instant, u32),
     pub(super) looked: Instant,
     /// Positions in the status before this one, whatever they are worth.
     pub(super) before: [u8; X],
@@ -108,6 +113,7 @@ impl<'a, const X: usize> Leader<'a, X> {
             command: None,
             told: None,
             heard: now,
+            answered: (now, 0),
             looked: now,
             before: status.position,
             suspect: 0,
@@ -129,6 +135,7 @@ impl<'a, const X: usize> Leader<'a, X> {
         if stood >= STALL {
             // Time in which nobody listened is no silence.
             self.heard = now;
+            self.answered.0 = now;
             self.forget();
             if stood >= STOOD && self.has_written(driver) {
                 return Some(End::Stood(stood));
@@ -136,10 +143,11 @@ impl<'a, const X: usize> Leader<'a, X> {
         }
         if let Some(Ok(status)) = heard {
             self.heard = now;
+            self.answered.0 = now;
             if let Some(end) = self.take(driver, now, &status) {
                 return Some(end);
             }
-        } else if since(now, self.heard) >= ticks(SILENCE) + self.patience {
+        } else if self.is_silent(driver, now) {
             return Some(End::Silent);
         }
         // No motion rests on a position older than it may be itself.
@@ -147,6 +155,16 @@ impl<'a, const X: usize> Leader<'a, X> {
         let command = self.command.filter(|_| fresh);
         driver.set_motion(command.map(|command| self.motion(command)), now);
         None
+    }
+
+    fn is_silent<B: Bench<X>>(&mut self, driver: &B, now: Instant) -> bool {
+        let counters = driver.counters();
+        let answers = counters.replies.wrapping_add(counters.stale);
+        if answers != self.answered.1 {
+            self.answered = (now, answers);
+        }
+        since(now, self.answered.0) >= ticks(SILENCE) + self.patience
+            || since(now, self.heard) >= NO_STATUS + self.patience
     }
 
     fn take<B: Bench<X>>(
