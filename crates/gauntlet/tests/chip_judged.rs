@@ -8,18 +8,13 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use gauntlet::emulator::{Emulator, Setup, find_firmware, qemu_is_there};
-use rig::Device;
 use rig::glove::VirtualGlove;
-use rig::gripper::{Config, VirtualGripper};
-use rig::pty::PtyDevice;
-use support::bench::{hand, standing};
+use rig::gripper::Config;
+use support::bench::{hand, jam, jumps};
 use support::{command, devices, model, refusal, run, text, until_line, wait};
 
 /// `bridge engage` for some seconds on a bridge in QEMU; `breaks` is done to the glove once the gripper follows the hand.
-fn engaged(
-    line: impl FnOnce(VirtualGripper) -> Box<dyn Device>,
-    breaks: impl FnOnce(&VirtualGlove),
-) -> Option<Output> {
+fn engaged(jammed: bool, breaks: impl FnOnce(&VirtualGlove)) -> Option<Output> {
     let firmware = find_firmware(None).ok().filter(|_| qemu_is_there());
     let Some(firmware) = firmware else {
         println!("skipped: no QEMU, or no firmware (`cargo xtask firmware`)");
@@ -29,9 +24,11 @@ fn engaged(
     let config = rig::glove::Config::at_baud(115_200);
     let glove = VirtualGlove::new(Box::new(hand(Arc::clone(&moves))), config);
     let (glove_port, _) = devices::behind_pty(glove.clone());
-    let gripper = VirtualGripper::new(Config::default());
+    let (gripper, gripper_port, _) = devices::gripper(Config::default());
     gripper.preset_active();
-    let gripper_port = PtyDevice::spawn(line(gripper), None).unwrap();
+    if jammed {
+        jam(&gripper);
+    }
     let mut emulator = Emulator::new(Setup {
         firmware,
         glove: Some(glove_port.path().to_owned()),
@@ -70,23 +67,23 @@ fn engaged(
 
 #[test]
 fn a_watch_whose_glove_is_lost_until_its_end_has_failed_and_one_whose_glove_works_has_not() {
-    let Some(output) = engaged(|gripper| Box::new(gripper), |_| {}) else {
+    let Some(output) = engaged(false, |_| {}) else {
         return;
     };
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let lost = |glove: &VirtualGlove| glove.unplug(0, true);
-    let output = engaged(|gripper| Box::new(gripper), lost).unwrap();
+    let output = engaged(false, lost).unwrap();
     let error = refusal(&output, 1);
     assert!(error.contains("sensors lost: hand"), "{error}");
-    let jumped = |glove: &VirtualGlove| glove.set_heading(0, 2.0);
-    let output = engaged(|gripper| Box::new(gripper), jumped).unwrap();
+    let jumped = |glove: &VirtualGlove| jumps(glove, 0);
+    let output = engaged(false, jumped).unwrap();
     let error = refusal(&output, 1);
     assert!(error.contains("not calibrated"), "{error}");
 }
 
 #[test]
 fn a_watch_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
-    let Some(output) = engaged(|gripper| standing(gripper, 0xFF), |_| {}) else {
+    let Some(output) = engaged(true, |_| {}) else {
         return;
     };
     let error = refusal(&output, 1);

@@ -4,10 +4,10 @@
 mod support;
 
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use support::bench::{Bench, Running, standing};
-use support::{command, refusal, run, text};
+use support::bench::{BRINGUP, Bench, Running, jam, jumps};
+use support::{command, interrupt, refusal, run, text};
 
 #[test]
 fn a_log_never_replaces_a_file_and_a_bring_up_that_fails_leaves_none() {
@@ -75,7 +75,7 @@ fn a_run_that_ends_without_its_glove_has_failed() {
     assert!(said.contains("the gripper is held where it is"), "{said}");
 }
 
-/// A run of some seconds from where something was commanded, with `what` done to its devices then; its end.
+/// A run that is ended by Ctrl-C after `what` was done to its devices, once something was commanded.
 fn after(bench: &mut Bench, what: impl FnOnce(&mut Bench)) -> std::process::Output {
     let mut running = Running::start(
         command(&bench.arguments())
@@ -85,6 +85,7 @@ fn after(bench: &mut Bench, what: impl FnOnce(&mut Bench)) -> std::process::Outp
     bench.until_commanded(&mut running.0);
     bench.hand_moves();
     what(bench);
+    interrupt(&running.0);
     running.finish()
 }
 
@@ -98,43 +99,61 @@ fn a_run_whose_glove_gives_nothing_that_can_be_used_until_its_end_has_failed() {
         ),
         (
             &|bench| (0..16).for_each(|k| bench.glove.unplug(k, true)),
-            "no longer sends frames",
+            "sensors lost",
         ),
         (&|bench| bench.glove.unplug(0, true), "sensor hand"),
-        (
-            &|bench| bench.glove.set_heading(0, 2.0),
-            "sensor hand jumped",
-        ),
+        (&|bench| jumps(&bench.glove, 0), "sensor hand jumped"),
     ];
     for (breaks, words) in broken {
-        let mut bench = Bench::new(&["--engage", "--seconds", "6"]);
-        let output = after(&mut bench, |bench| breaks(bench));
+        let mut bench = Bench::new(&["--engage"]);
+        let output = after(&mut bench, |bench| {
+            breaks(bench);
+            std::thread::sleep(Duration::from_secs(4));
+        });
+        // On a busy machine no frame at all may have come at the end.
         let error = refusal(&output, 1);
-        assert!(error.contains("glove") && error.contains(words), "{error}");
+        assert!(error.contains("glove"), "{words}: {error}");
         let said = text(&output.stdout);
+        assert!(said.contains(words), "{words}: {said}");
         assert!(said.contains("the gripper is held where it is"), "{said}");
     }
 }
 
 #[test]
 fn a_run_whose_glove_came_back_has_not_failed() {
-    let mut bench = Bench::new(&["--engage", "--seconds", "9"]);
+    let mut bench = Bench::new(&["--engage"]);
     let output = after(&mut bench, |bench| {
         bench.glove.freeze(3, true);
         std::thread::sleep(Duration::from_secs(2));
         bench.glove.freeze(3, false);
+        std::thread::sleep(Duration::from_secs(4));
     });
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
 }
 
+/// Until the gripper has been told to be elsewhere for long, however often this machine has the motion held meanwhile.
+fn until_told(bench: &Bench) {
+    let pause = Duration::from_millis(20);
+    let end = Instant::now() + 2 * BRINGUP;
+    let mut told = Duration::ZERO;
+    while told < Duration::from_secs(4) {
+        assert!(
+            Instant::now() < end,
+            "it was told to move for {told:?} only"
+        );
+        std::thread::sleep(pause);
+        let away = f32::from(bench.gripper.command_block()[3]) - bench.gripper.positions()[0];
+        if away.abs() >= 30.0 {
+            told += pause;
+        }
+    }
+}
+
 #[test]
 fn a_run_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
-    for contact in [0x00, 0xFF] {
-        let options = ["--engage", "--seconds", "9"];
-        let mut bench = Bench::behind(|gripper| standing(gripper, contact), &options);
-        bench.gripper.preset_active();
-        let output = after(&mut bench, |_| {});
-        let error = refusal(&output, 1);
-        assert!(error.contains("never moved"), "{contact:02X}: {error}");
-    }
+    let mut bench = Bench::new(&["--engage"]);
+    jam(&bench.gripper);
+    let output = after(&mut bench, |bench| until_told(bench));
+    let error = refusal(&output, 1);
+    assert!(error.contains("never moved"), "{error}");
 }

@@ -5,7 +5,7 @@ mod support;
 
 use std::time::{Duration, Instant};
 
-use support::bench::{BRINGUP, Bench, ends_soon};
+use support::bench::{BRINGUP, Bench, ends_soon, jumps};
 use support::terminal::Terminal;
 
 /// Longer than a mere event is shown.
@@ -28,12 +28,10 @@ fn a_sensor_that_jumped_is_named_as_long_as_its_joints_are_held() {
     let bench = Bench::new(&[]);
     let mut terminal = Terminal::start(&bench.arguments());
     until_shown(&mut terminal, &["all", "well"]);
-    bench.glove.set_heading(5, 2.0);
+    jumps(&bench.glove, 5);
     until_shown(&mut terminal, &["index_middle", "jumped"]);
     std::thread::sleep(LONG);
-    let shown = terminal.redrawn();
-    assert!(shown.contains("index_middle"), "{shown}");
-    assert!(shown.contains("calibration"), "{shown}");
+    until_shown(&mut terminal, &["index_middle", "calibration"]);
     terminal.keys(b"c");
     until_shown(&mut terminal, &["calibrated"]);
     std::thread::sleep(LONG);
@@ -52,8 +50,7 @@ fn a_frozen_sensor_is_named_until_it_lives_again() {
     bench.glove.freeze(8, true);
     until_shown(&mut terminal, &["middle_middle", "frozen"]);
     std::thread::sleep(LONG);
-    let shown = terminal.redrawn();
-    assert!(shown.contains("middle_middle"), "{shown}");
+    until_shown(&mut terminal, &["middle_middle"]);
     bench.glove.freeze(8, false);
     std::thread::sleep(Duration::from_secs(2));
     let shown = terminal.redrawn();

@@ -222,6 +222,10 @@ fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
     let all = |health: &[Health; SEGMENT_COUNT]| health.iter().all(|health| health.is_good());
     let health = |seen: &Snapshot| seen.frame.map(|frame| frame.samples.map(|s| s.health));
     run.wait(STRAGGLERS, |seen| health(seen).is_some_and(|h| all(&h)))?;
+    // One that is still being brought up says soon what it fails with.
+    run.wait(2 * STRAGGLERS, |seen| {
+        health(seen).is_some_and(|h| !h.contains(&Health::Starting))
+    })?;
     let seen = run.session().snapshot();
     let Some(health) = seen.as_ref().and_then(health).filter(|health| !all(health)) else {
         return Ok(());

@@ -7,13 +7,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::{Config, VirtualGripper};
-use rig::pty::{Handle, PtyDevice};
+use rig::pty::Handle;
 use rustix::process::{Pid, Signal, kill_process};
 
-use super::lines::{Shaped, at_once};
 use super::{devices, model, wait};
 
 /// An orderly end: 1.5 s for the hold, 2 s for what is printed, and a busy machine.
@@ -59,11 +57,6 @@ impl Bench {
     }
 
     pub fn inactive(more: &[&str]) -> Self {
-        Self::behind(|gripper| Box::new(gripper), more)
-    }
-
-    /// The same behind a line that does something to the gripper's words.
-    pub fn behind(line: impl FnOnce(VirtualGripper) -> Box<dyn Device>, more: &[&str]) -> Self {
         let folder = tempfile::tempdir().unwrap();
         let moves = Arc::new(AtomicBool::new(false));
         let glove = VirtualGlove::new(
@@ -71,15 +64,14 @@ impl Bench {
             rig::glove::Config::at_baud(115_200),
         );
         let (glove_port, glove_path) = devices::behind_pty(glove.clone());
-        let gripper = VirtualGripper::new(Config::default());
-        let gripper_port = PtyDevice::spawn(line(gripper.clone()), None).unwrap();
+        let (gripper, gripper_port, gripper_path) = devices::gripper(Config::default());
         let log = folder.path().join("run.mcap");
         let words = [
             "teleop",
             "--glove",
             &glove_path,
             "--gripper",
-            gripper_port.path().to_str().unwrap(),
+            &gripper_path,
             "--model",
             model().to_str().unwrap(),
             "--calibrate-flat",
@@ -217,18 +209,17 @@ pub fn send(child: &Child, signal: Signal) {
     kill_process(id, signal).unwrap();
 }
 
-/// A gripper that takes every command and says that its fingers are where they were, moving or at their position.
-pub fn standing(gripper: VirtualGripper, contact: u8) -> Box<dyn Device> {
-    Box::new(Shaped::new(gripper, move |mut frame| {
-        if frame.len() >= 21 && matches!(frame[1], 3 | 4 | 23) && frame[2] == 16 {
-            frame[3 + 1] = contact;
-            for axis in 0..4 {
-                frame[3 + 4 + 3 * axis] = 30;
-            }
-            let body = frame.len() - 2;
-            let crc = gripper::rtu::crc16(&frame[..body]).to_le_bytes();
-            frame[body..].copy_from_slice(&crc);
-        }
-        at_once(frame)
-    }))
+/// From now on none of its axes moves, whatever it is told.
+pub fn jam(gripper: &VirtualGripper) {
+    for (axis, at) in gripper.positions().into_iter().enumerate() {
+        gripper.set_limits(axis, Some((at, at)));
+    }
+}
+
+/// A sensor jumps as no hand does; several times, since in the pauses that a busy machine makes a hand may turn by half.
+pub fn jumps(glove: &VirtualGlove, sensor: usize) {
+    for heading in [3.0, 0.0, 3.0, 0.0, 3.0] {
+        glove.set_heading(sensor, heading);
+        std::thread::sleep(Duration::from_millis(500));
+    }
 }

@@ -42,7 +42,10 @@ pub fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrup
     let longest = end + STUBBORN;
     let (mut frames, mut since) = (0_u32, Instant::now());
     let mut seen = [Seen::default(); SEGMENT_COUNT];
-    let tried = |scanner: &Scanner<Port>| scanner.state() != State::Starting;
+    // Not before each was brought up, or has failed: what it failed with is the finding.
+    let tried = |scanner: &Scanner<Port>| {
+        scanner.state() != State::Starting && !scanner.health().contains(&Health::Starting)
+    };
     while (Instant::now() < end || !tried(&scanner) && Instant::now() < longest)
         && !interrupt.asked()
     {
