@@ -1,7 +1,7 @@
 //! A glove and a gripper on byte-timed wires and one virtual clock, and a weights store that holds a map.
 
+use crate::nor_slot::NorSlot;
 use bridge::WeightsStore;
-use gauntlet::slots::MemorySlot;
 use rig::glove::VirtualGlove;
 use rig::gripper::{Family, VirtualGripper};
 use rig::{Clock, MemoryWire};
@@ -48,7 +48,7 @@ impl Devices {
 ///
 /// # Panics
 /// Where the store does not take it.
-pub fn store(image: &[u8]) -> WeightsStore<MemorySlot> {
+pub fn store(image: &[u8]) -> WeightsStore<NorSlot> {
     let mut store = empty_store(4);
     store.begin(image.len()).expect("room");
     store.chunk(0, image).expect("bytes");
@@ -57,7 +57,7 @@ pub fn store(image: &[u8]) -> WeightsStore<MemorySlot> {
 }
 
 /// A store without an image, for a gripper with this many axes.
-pub fn empty_store(axes: usize) -> WeightsStore<MemorySlot> {
-    let slots = [MemorySlot::new(), MemorySlot::new()];
+pub fn empty_store(axes: usize) -> WeightsStore<NorSlot> {
+    let slots = [NorSlot::new(), NorSlot::new()];
     WeightsStore::new(slots, bridge::app::expected(axes))
 }

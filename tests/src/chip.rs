@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use gauntlet::emulator::{FIRMWARE, QEMU, qemu_is_there};
+use host::chip::emulator::{FIRMWARE, QEMU, qemu_is_there};
 
 /// Order: the map's bits. First input an image, second the inputs of 25 f32 each.
 pub const BITS: u32 = 1;

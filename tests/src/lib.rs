@@ -6,6 +6,7 @@ pub mod chip;
 pub mod debugger;
 pub mod emulated;
 pub mod images;
+pub mod nor_slot;
 pub mod power_cuts;
 pub mod slot_contents;
 pub mod standstill;

@@ -9,9 +9,9 @@
 
 use std::ops::Range;
 
+use crate::nor_slot::NorSlot;
 use bridge::WeightsStore;
 use bridge::store::{Error, Expected};
-use gauntlet::slots::MemorySlot;
 use hae::image::JointOrder;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -31,10 +31,10 @@ pub struct Bench<const ERASE: usize> {
     images: Vec<Vec<u8>>,
     power: Power,
     /// The flash; taken while a store has it.
-    slots: Option<[MemorySlot<UNIT, ERASE>; 2]>,
+    slots: Option<[NorSlot<UNIT, ERASE>; 2]>,
 }
 
-type Store<const ERASE: usize> = WeightsStore<MemorySlot<UNIT, ERASE>>;
+type Store<const ERASE: usize> = WeightsStore<NorSlot<UNIT, ERASE>>;
 
 /// What the cells of both slots hold.
 pub type Cells = [Vec<u8>; 2];
@@ -81,7 +81,7 @@ impl<const ERASE: usize> Bench<ERASE> {
             .collect();
         let power = Power::new();
         let capacity = images[0].len().next_multiple_of(ERASE) + ERASE;
-        let slot = || MemorySlot(Nor::with_power(capacity, &power).by_unit());
+        let slot = || NorSlot(Nor::with_power(capacity, &power).by_unit());
         Self {
             expected: Expected { shape, joint_order },
             slots: Some([slot(), slot()]),

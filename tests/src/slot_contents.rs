@@ -1,9 +1,9 @@
 //! Any contents of the weights flash: random, mutated, and mutated with every checksum made right again.
 
+use crate::nor_slot::NorSlot;
 use bridge::store::{Expected, WeightsStore};
 use bridge::supervisor::{Hand, Inputs, Supervisor, Weights};
 use bridge::{Clutch, Config, HoldReason, Instant, State};
-use gauntlet::slots::MemorySlot;
 use gripper::registers::Fault;
 use gripper::{Activation, Contact, Status};
 use hae::image::JointOrder;
@@ -22,7 +22,7 @@ const EXPECTED: Expected = Expected {
     joint_order: JointOrder::Columns,
 };
 
-type Slot = MemorySlot<4, ERASE>;
+type Slot = NorSlot<4, ERASE>;
 
 /// What became of the contents.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -45,7 +45,7 @@ pub fn mutate(count: u64, seed: u64, progress: &mut dyn FnMut(u64, u64)) -> Foun
         .map(|seed| images::random(SHAPE, JointOrder::Columns, seed))
         .collect();
     let (both, capacity) = flashed(&known);
-    let mut slots = Some([0, 1].map(|_| MemorySlot(Nor::new(capacity))));
+    let mut slots = Some([0, 1].map(|_| NorSlot(Nor::new(capacity))));
     let mut found = Found::default();
     for number in 0..count {
         let mut places: [Slot; 2] = slots.take().expect("given back below");
@@ -67,7 +67,7 @@ pub fn mutate(count: u64, seed: u64, progress: &mut dyn FnMut(u64, u64)) -> Foun
 /// The cells after all of `images` were flashed, and a slot's bytes.
 fn flashed(images: &[Vec<u8>]) -> ([Vec<u8>; 2], usize) {
     let capacity = images[0].len().next_multiple_of(ERASE) + ERASE;
-    let slots: [Slot; 2] = [0, 1].map(|_| MemorySlot(Nor::new(capacity)));
+    let slots: [Slot; 2] = [0, 1].map(|_| NorSlot(Nor::new(capacity)));
     let mut store = WeightsStore::new(slots, EXPECTED);
     for image in images {
         store.begin(image.len()).expect("room");

@@ -6,11 +6,11 @@ use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
 
+use crate::nor_slot::NorSlot;
 use bridge::protocol::message::{CHUNK, Call, Request, VERSION};
 use bridge::protocol::{Outcome, Server, frame};
 use bridge::{App, Config, Instant, Platform, State, WeightsStore};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
-use gauntlet::slots::MemorySlot;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
 use rig::faulty::{Faults, Faulty};
@@ -40,8 +40,8 @@ const CALIBRATE_EVERY: u64 = 2_100_000;
 const ACTIVE: u64 = 20_000_000;
 
 /// Two erased slots as large as the board's.
-pub fn slots() -> [MemorySlot; 2] {
-    [MemorySlot(Nor::new(SLOT)), MemorySlot(Nor::new(SLOT))]
+pub fn slots() -> [NorSlot; 2] {
+    [NorSlot(Nor::new(SLOT)), NorSlot(Nor::new(SLOT))]
 }
 
 /// A trace and what the bridge did while it was recorded.

@@ -4,12 +4,12 @@
 //! The tests run a part of each campaign; `cargo xtask campaign` runs the whole ones (the ignored tests).
 
 use bridge::{App, Config, Epoch, Instant, Platform, State};
-use gauntlet::slots::MemorySlot;
 use glove::scan::Scanner;
 use gripper::driver::{self, ThreeFinger};
 use gripper::{Activation, Duration, timing};
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use loop_tests::bench::{self, BAUD, Devices};
+use loop_tests::nor_slot::NorSlot;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
@@ -81,7 +81,7 @@ fn waving(time_s: f64) -> [f32; 25] {
     hand((0.5 - 0.5 * (time_s * core::f64::consts::PI / 2.0).cos()) as f32)
 }
 
-type Loop = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, MemorySlot, 4>;
+type Loop = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, NorSlot, 4>;
 
 struct Bench {
     app: Loop,

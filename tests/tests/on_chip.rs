@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use bridge::protocol::message::{Answer, Call, Refusal, Restart};
 use bridge::{HoldReason, State};
-use gauntlet::failure::Failure;
-use gauntlet::host_link::{Error, HostLink};
-use gauntlet::interrupt::Interrupt;
 use hae::image::JointOrder;
+use host::chip::link::{Error, HostLink};
+use host::failure::Failure;
+use host::interrupt::Interrupt;
 use loop_tests::chip::firmware;
 use loop_tests::debugger;
 use loop_tests::emulated::{

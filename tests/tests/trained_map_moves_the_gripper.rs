@@ -2,14 +2,14 @@
 //! sensors behind the serial bridge, the map, the supervisor, Modbus, the virtual gripper's own fingers.
 
 use bridge::{App, Config, Instant, Platform, State};
-use gauntlet::interrupt::Interrupt;
-use gauntlet::poses::Motion;
-use gauntlet::slots::MemorySlot;
-use gauntlet::training::{Request, train};
 use glove::hand::LIMITS;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
+use host::interrupt::Interrupt;
+use host::training::motion::Motion;
+use host::training::{Request, train};
 use loop_tests::bench::{self, Devices};
+use loop_tests::nor_slot::NorSlot;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
@@ -38,7 +38,7 @@ impl Platform for Machine {
     }
 }
 
-type Bridge = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, MemorySlot, 4>;
+type Bridge = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, NorSlot, 4>;
 
 struct Bench {
     app: Bridge,
@@ -118,13 +118,13 @@ fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
             pairs: 8,
             start_pairs: true,
             seed: SEED,
-            quiet: true,
+            reporter: &host::report::Nobody,
         },
         &Interrupt::never().unwrap(),
     )
     .unwrap();
     println!("seed {SEED}: {:?}", outcome.quality);
-    let image = gauntlet::model::image(&outcome.model).unwrap();
+    let image = host::training::model::image(&outcome.model).unwrap();
     let hand = Generator::new(&LIMITS, SEED);
 
     let mut bench = Bench::new(&image, hand.flat_hand());

@@ -17,14 +17,14 @@ use bridge::clutch::HeartbeatRefusal;
 use bridge::protocol::message::{Counters, Sample, Status};
 use bridge::{Epoch, HoldReason};
 
-use crate::failure::{Failure, OrFail};
-use crate::host_link::{Error, Heartbeat, HostLink};
-use crate::interrupt::Interrupt;
 use crate::live::{Key, Live};
 use crate::out;
 use crate::run::{End, Ending, Lasting, MOVED_COUNTS, Obeyed, first_failure};
-use crate::stats::{Percentiles, Rate};
-use crate::stopped::Stopped;
+use host::chip::link::{Error, Heartbeat, HostLink};
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::session::stopped::Stopped;
+use host::stats::{Percentiles, Rate};
 
 /// Pause between two heartbeats, spent listening.
 const HEARTBEAT: Duration = Duration::from_millis(100);

@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use clap::{Args, Parser, Subcommand, ValueEnum};
 
-use crate::failure::Failure;
-use crate::host_link::Address;
-use crate::line::Settings;
+use host::chip::link::Address;
+use host::failure::Failure;
+use host::lines::Settings;
 
 /// Operate a Robotiq 3-Finger gripper with a glove of 16 orientation sensors, or try it all without hardware.
 ///
@@ -144,8 +144,8 @@ pub struct Simulate {
     #[arg(long, value_name = "PATH")]
     pub gripper: Option<PathBuf>,
     /// Which gripper it is; the 3-Finger if not said.
-    #[arg(long, value_enum)]
-    pub gripper_model: Option<crate::commands::gripper::Model>,
+    #[arg(long, value_name = "MODEL", value_parser = crate::commands::gripper::model_parser())]
+    pub gripper_model: Option<host::lines::Model>,
     /// The glove plays this recording of a hand instead of generated motion.
     #[arg(long, value_name = "FILE.csv")]
     pub poses: Option<PathBuf>,
@@ -164,7 +164,7 @@ pub struct LineOptions {
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
     pub baud: Option<u32>,
     /// Wait so much longer for the gripper's answers, milliseconds (1 to 1000): for a serial tunnel or a slow network.
-    #[arg(long, value_name = "MS", value_parser = crate::line::patience)]
+    #[arg(long, value_name = "MS", value_parser = host::lines::patience)]
     pub patience: Option<Duration>,
 }
 
@@ -232,8 +232,8 @@ pub struct Teleop {
     #[command(flatten)]
     pub line: LineOptions,
     /// Which gripper it is: only the 3-Finger follows a glove for now.
-    #[arg(long, value_enum, default_value_t = crate::commands::gripper::Model::ThreeFinger)]
-    pub gripper_model: crate::commands::gripper::Model,
+    #[arg(long, value_name = "MODEL", value_parser = crate::commands::gripper::model_parser(), default_value = "3f")]
+    pub gripper_model: host::lines::Model,
     /// Write every frame, command and status into this session log.
     #[arg(long, value_name = "FILE.mcap")]
     pub log: Option<PathBuf>,

@@ -4,7 +4,8 @@ use std::process::ExitCode;
 
 use clap::Parser;
 use gauntlet::cli::Cli;
-use gauntlet::{commands, failure, note, out};
+use gauntlet::{commands, note, out};
+use host::failure;
 
 fn main() -> ExitCode {
     let done = commands::run(Cli::parse());

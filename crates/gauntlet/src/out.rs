@@ -12,8 +12,8 @@ use std::time::Duration;
 
 use anyhow::Result;
 
-use crate::failure::Failure;
-use crate::interrupt;
+use host::failure::Failure;
+use host::interrupt;
 use stream::{STDERR, STDOUT};
 
 /// What one stream may wait for the other, so that lines keep their order on a terminal that shows both.

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use trainer::whole_file;
 
-use crate::failure::Failure;
+use host::failure::Failure;
 
 /// What is to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

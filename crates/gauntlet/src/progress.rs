@@ -9,8 +9,9 @@ use std::time::{Duration, Instant};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle, TermLike};
 use rustix::termios::tcgetwinsize;
 
-use crate::stats::seconds;
 use crate::{note, out};
+use host::report::Reporter;
+use host::stats::seconds;
 
 /// Pause between two plain lines.
 const LINE_EVERY: Duration = Duration::from_secs(5);
@@ -129,6 +130,30 @@ fn bar(what: &'static str, total: u64) -> ProgressBar {
     }
     bar.set_prefix(what);
     bar
+}
+
+/// A person at the terminal hears of the work that `host` does.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Person;
+
+impl Reporter for Person {
+    fn note(&self, text: &str) {
+        note!("{text}");
+    }
+
+    fn begin(&self, what: &'static str, total: u64) -> Box<dyn host::report::Progress> {
+        Box::new(Progress::start(what, total, false))
+    }
+}
+
+impl host::report::Progress for Progress {
+    fn at(&mut self, done: u64, left: Option<Duration>, detail: &dyn Fn() -> String) {
+        self.at_with(done, left, detail);
+    }
+
+    fn note(&self, text: &str) {
+        self.say(text);
+    }
 }
 
 /// The terminal at standard error, drawn on through the queue of `out`.

@@ -4,9 +4,9 @@
 use std::sync::mpsc::{RecvTimeoutError, channel};
 use std::time::Duration;
 
-use crate::failure::{self, Failure};
-use crate::interrupt::Interrupt;
 use crate::{note, out};
+use host::failure::{self, Failure};
+use host::interrupt::Interrupt;
 
 /// Pause between two looks at whether somebody asked for the end.
 const LOOK: Duration = Duration::from_millis(50);

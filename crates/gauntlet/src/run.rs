@@ -21,14 +21,14 @@ use bridge::telemetry::Sent;
 use bridge::{HoldReason, State};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use crate::failure::OrFail;
-use crate::interrupt::Interrupt;
 use crate::live::{Key, Live};
-use crate::platform::Clock;
-use crate::record::{AXES, Record, Sort};
-use crate::session::{Order, Session, Snapshot};
-use crate::session_log::SessionLog;
 use crate::{note, out};
+use host::clock::Clock;
+use host::failure::OrFail;
+use host::interrupt::Interrupt;
+use host::recording::SessionLog;
+use host::session::record::{AXES, Record, Sort};
+use host::session::{Order, Session, Snapshot};
 use shown::Shown;
 
 pub use ending::{Ending, Finished, first_failure};

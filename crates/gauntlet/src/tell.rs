@@ -3,7 +3,7 @@
 use std::fmt::Arguments;
 
 use crate::out;
-use crate::session_log::Written;
+use host::recording::Written;
 
 /// Where the words go.
 #[derive(Debug, Clone, Copy)]

@@ -7,7 +7,7 @@ use std::process::{Output, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use gauntlet::emulator::{Emulator, Setup, find_firmware, qemu_is_there};
+use host::chip::emulator::{Emulator, Setup, find_firmware, qemu_is_there};
 use rig::glove::VirtualGlove;
 use rig::gripper::Config;
 use support::bench::{hand, jam, jumps};

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use gauntlet::platform::Clock;
-use gauntlet::port::{BAUD, Port};
 use glove::scan::{Config, Scanner};
+use host::clock::Clock;
+use host::lines::port::{BAUD, Port};
 use rig::glove::VirtualGlove;
 use rig::pty::PtyDevice;
 

@@ -10,12 +10,12 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use gauntlet::interrupt::Interrupt;
-use gauntlet::platform::Clock;
-use gauntlet::tcp::{Address, Error, Port, UNIT};
 use gripper::driver::ThreeFinger;
 use gripper::registers::{COMMAND, STATUS, three_finger};
 use gripper::{Activation, Gripper, Motion, Status};
+use host::clock::Clock;
+use host::interrupt::Interrupt;
+use host::lines::tcp::{Address, Error, Port, UNIT};
 use rig::gripper::{Config, VirtualGripper, tcp};
 use tokio_modbus::prelude::{
     ExceptionCode, Reader, Request, Response, Slave, SlaveRequest, Writer,
@@ -522,7 +522,7 @@ fn a_port_without_a_listener_is_refused_with_a_next_step() {
         port,
     };
     let refused = Port::connect(&address, UNIT, &Interrupt::never().unwrap()).unwrap_err();
-    let (text, code) = gauntlet::failure::report(&refused);
+    let (text, code) = host::failure::report(&refused);
     assert!(text.contains("refused") && text.contains("try:"), "{text}");
     assert_eq!(code, 1);
 }

@@ -6,7 +6,7 @@ use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-use gauntlet::interrupt::Interrupt;
+use host::interrupt::Interrupt;
 
 /// Names the fault that a child of these tests runs into.
 const FAULT: &str = "GAUNTLET_TEST_FAULT";
@@ -63,7 +63,7 @@ fn ends(fault: &str) -> Output {
 #[test]
 fn a_stack_that_overflows_is_told_and_ends_the_program() {
     let output = ends("stack");
-    assert_eq!(output.status.signal(), Some(libc::SIGABRT), "{output:?}");
+    assert_eq!(output.status.signal(), Some(rustix::process::Signal::ABORT.as_raw()), "{output:?}");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("overflowed its stack"), "{said}");
 }
@@ -72,5 +72,5 @@ fn a_stack_that_overflows_is_told_and_ends_the_program() {
 #[test]
 fn an_instruction_that_is_none_ends_the_program() {
     let output = ends("instruction");
-    assert_eq!(output.status.signal(), Some(libc::SIGILL), "{output:?}");
+    assert_eq!(output.status.signal(), Some(rustix::process::Signal::ILL.as_raw()), "{output:?}");
 }

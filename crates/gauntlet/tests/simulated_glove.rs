@@ -7,12 +7,12 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use embedded_io::{Read, ReadReady, Write};
-use gauntlet::platform::Clock;
-use gauntlet::port::{BAUD, Port};
 use glove::hand::flat::{FlatHand, Progress};
 use glove::hand::{Calibration, Side, joint_angles};
 use glove::scan::{Config, Scanner};
 use glove::timing;
+use host::clock::Clock;
+use host::lines::port::{BAUD, Port};
 use support::Simulation;
 
 /// Channel 0 of the multiplexer, then the chip id of the sensor at 0x28.

@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use bridge::State;
 use gripper::Activation;
 
-use crate::host_link::{Error, HostLink};
-use crate::stopped::{HOLD_WAIT, Stopped};
+use host::chip::link::{Error, HostLink};
+use host::session::stopped::{HOLD_WAIT, Stopped};
 
 /// Between two looks.
 const PAUSE: Duration = Duration::from_millis(30);

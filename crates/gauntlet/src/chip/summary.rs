@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use crate::stats::short_or_dash;
+use host::stats::short_or_dash;
 
 /// What was seen.
 #[derive(Debug, Clone, Serialize)]

@@ -6,7 +6,7 @@ use gripper::{Activation, Fault};
 
 use super::{Options, Watch};
 use crate::live::{Axis, Finger, View};
-use crate::words;
+use host::words;
 
 impl Watch<'_> {
     pub(super) fn view(&mut self, options: &Options) -> View {

@@ -13,12 +13,13 @@ use serde_json::json;
 use super::flash::slot_lines;
 use crate::chip::{Options, Watch, Watched, standing_faults, write_head, write_row};
 use crate::cli::{Bridge, BridgeAt, BridgeVerb};
-use crate::failure::{Failure, OrFail};
-use crate::host_link::{Error, HostLink};
-use crate::interrupt::Interrupt;
+use crate::out;
 use crate::run::calibrating;
 use crate::tell::Tell;
-use crate::{out, words};
+use host::chip::link::{Error, HostLink};
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::words;
 
 /// An activation takes a few seconds; a gripper that needs longer has a fault.
 const ACTIVATION_WAIT: Duration = Duration::from_secs(20);

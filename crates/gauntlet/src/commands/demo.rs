@@ -12,18 +12,23 @@ use trainer::algorithm::Schedule;
 
 use super::{on_chip, teleop};
 use crate::cli::Demo;
-use crate::failure::{Failure, OrFail};
-use crate::interrupt::Interrupt;
-use crate::platform::Clock;
-use crate::port::BAUD;
-use crate::poses::Motion;
-use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
+use crate::played;
+use crate::progress::Person;
 use crate::run::{End, Finished, Options, Run};
-use crate::session::{Parts, Session};
-use crate::stats::seconds;
 use crate::tell::Tell;
-use crate::training::{Outcome, Request, train};
-use crate::{model, out, outputs, probe, reading, realtime};
+use crate::{out, outputs, reading};
+use host::clock::Clock;
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::lines::port::BAUD;
+use host::probe;
+use host::realtime;
+use host::session::{Parts, Session};
+use host::stats::seconds;
+use host::training::model;
+use host::training::motion::Motion;
+use host::training::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
+use host::training::{Outcome, Request, train};
 
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
@@ -41,7 +46,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let clock = Clock::start();
     let tell = Tell::new(options.json);
     let motion = reading::ended_by(interrupt, "the recording", || {
-        Motion::open_for_training(options.poses.as_deref(), options.seed)
+        Motion::open_for_training(options.poses.as_deref(), options.seed, &Person)
     })?;
     if let Some(path) = &options.log {
         outputs::check_new(path)?;
@@ -87,7 +92,7 @@ pub(super) fn trained(
         pairs: PAIRS,
         start_pairs: !options.no_start_pairs,
         seed: options.seed,
-        quiet: false,
+        reporter: &Person,
     };
     tell.say(format_args!(
         "training   {} and {PAIRS} chosen where they help most; a scripted operator shows the hand poses;",
@@ -132,11 +137,11 @@ fn devices(
         glove.path().display(),
         gripper.path().display()
     ));
-    let (gripper_port, _) = probe::open_gripper(gripper.path(), interrupt)?;
+    let (gripper_port, _) = probe::open_gripper(gripper.path(), &Person, interrupt)?;
     let parts = Parts {
         glove: probe::open_glove(glove.path(), interrupt)?.port,
         gripper: gripper_port,
-        line: crate::line::Settings::default(),
+        line: host::lines::Settings::default(),
         image,
         config: bridge::Config::default(),
     };
@@ -145,7 +150,10 @@ fn devices(
 
 /// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
 pub(super) fn virtual_devices(motion: &Motion) -> Result<[Handle; 2]> {
-    let glove = VirtualGlove::new(motion.virtual_hand(), rig::glove::Config::at_baud(BAUD));
+    let glove = VirtualGlove::new(
+        played::virtual_hand(motion),
+        rig::glove::Config::at_baud(BAUD),
+    );
     let glove = spawn("glove", Box::new(glove))?;
     let gripper = VirtualGripper::new(rig::gripper::Config::default());
     let gripper = spawn("gripper", Box::new(gripper))?;

@@ -7,11 +7,13 @@ use clap::Args;
 use serde_json::json;
 
 use crate::cli::LineOptions;
-use crate::commands::gripper::Model;
-use crate::diagnose::{self, Asked, Findings, Verdict};
-use crate::failure::{Failure, OrFail};
-use crate::interrupt::Interrupt;
-use crate::{out, ports, say};
+use crate::progress::Person;
+use crate::{out, say};
+use host::diagnose::{self, Asked, Findings, Verdict};
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::lines::Model;
+use host::lines::list;
 
 /// Options of `doctor`.
 #[derive(Debug, Args)]
@@ -60,6 +62,7 @@ pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
         let asked = Asked {
             settings: options.line.settings(path)?,
             model: options.gripper_model,
+            reporter: Some(&Person),
         };
         let findings = diagnose::gripper(path, asked, interrupt);
         examine("gripper", path.display().to_string(), findings);
@@ -120,7 +123,7 @@ fn show(device: &str, place: &str, findings: &Findings) {
 }
 
 fn only_ports(as_json: bool) -> Result<()> {
-    let ports = ports::list().or_fail(
+    let ports = list::list().or_fail(
         || "the serial ports cannot be listed".to_owned(),
         "`ls /dev/tty*`",
     )?;

@@ -10,14 +10,18 @@ use trainer::measures::NEIGHBOURS;
 use trainer::model::Model;
 
 use super::train::CoverageArgs;
-use crate::failure::{Failure, told};
-use crate::poses::Motion;
-use crate::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Measured, Quality, measuring_targets};
-use crate::training::{
+use crate::progress::Person;
+use crate::{note, out, say};
+use host::failure::{Failure, told};
+use host::training::model;
+use host::training::motion::Motion;
+use host::training::quality::{
+    GREATEST_D_KNN, LEAST_OCCUPANCY, Measured, Quality, measuring_targets,
+};
+use host::training::{
     domains::{matching, pairs, samples},
     sorted,
 };
-use crate::{model, note, out, say};
 
 /// Options of `eval`.
 #[derive(Debug, Args)]
@@ -78,8 +82,8 @@ pub(super) fn run(options: &Eval) -> Result<()> {
 }
 
 fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
-    let model = model::load(&options.model)?;
-    let frames = Motion::open_for_measuring(poses)?.frames();
+    let model = model::load(&options.model, &Person)?;
+    let frames = Motion::open_for_measuring(poses, &Person)?.frames();
     let held_out = held_out(&model, &frames);
     warn(held_out, poses);
     let quality = Quality::of(
@@ -124,16 +128,16 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
 }
 
 fn of_domains(options: &Eval, input: &Path, target: &Path) -> Result<()> {
-    let inputs = samples(input, "q")?;
-    let targets = samples(target, "x")?;
+    let inputs = samples(input, "q", &Person)?;
+    let targets = samples(target, "x", &Person)?;
     require_rows(input, inputs.rows, NEIGHBOURS + 1).map_err(told)?;
-    let model = model::load_any(&options.model)?;
+    let model = model::load_any(&options.model, &Person)?;
     model
         .require_shape(&options.model, inputs.cols, targets.cols)
         .map_err(told)?;
     let truth = match &options.truth {
         Some(file) => {
-            let truth = pairs(file)?;
+            let truth = pairs(file, &Person)?;
             let found = [truth.inputs.cols, truth.targets.cols];
             if found != [inputs.cols, targets.cols] {
                 let what = format!(

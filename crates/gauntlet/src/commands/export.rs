@@ -7,10 +7,12 @@ use clap::Args;
 use serde_json::json;
 use trainer::whole_file;
 
-use crate::failure::OrFail;
+use crate::out;
 use crate::outputs::{self, Kind};
+use crate::progress::Person;
 use crate::tell::Tell;
-use crate::{model, out};
+use host::failure::OrFail;
+use host::training::model;
 
 /// Options of `export`.
 #[derive(Debug, Args)]
@@ -46,7 +48,7 @@ pub(super) fn run(options: &Export) -> Result<()> {
     let mut inputs = vec![options.model.as_path()];
     inputs.extend(options.int16.as_deref());
     outputs::check(&options.out, Kind::Image, &inputs)?;
-    let weights = model::weights(&options.model, options.int16.as_deref())?;
+    let weights = model::weights(&options.model, options.int16.as_deref(), &Person)?;
     whole_file::write(&options.out, &weights.image).or_fail(
         || format!("{} is not written", options.out.display()),
         "a folder with room that you may write in",

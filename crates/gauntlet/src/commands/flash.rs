@@ -5,13 +5,14 @@ use bridge::protocol::message::{SlotContents, Slots, WeightsKind};
 use serde::Serialize;
 
 use crate::cli::Flash;
-use crate::failure::Failure;
-use crate::host_link::{Flashed, HostLink};
-use crate::interrupt::Interrupt;
-use crate::model::{self, Int16};
+use crate::progress::Person;
 use crate::progress::Progress;
 use crate::tell::Tell;
 use crate::{out, reading};
+use host::chip::link::{Flashed, HostLink};
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::training::model::{self, Int16};
 
 /// Writes the file's weights into the bridge.
 ///
@@ -20,7 +21,7 @@ use crate::{out, reading};
 pub(super) fn run(options: &Flash, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let weights = reading::ended_by(interrupt, "what is to be written", || {
-        model::weights(&options.file, options.int16.as_deref())
+        model::weights(&options.file, options.int16.as_deref(), &Person)
     })?;
     if let Some(int16) = &weights.int16 {
         tell.say(format_args!("int16      {}", int16.line()));

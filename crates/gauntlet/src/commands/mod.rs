@@ -17,13 +17,13 @@ pub mod train;
 use anyhow::Result;
 
 use crate::cli::{Cli, Demo, Verb};
-use crate::failure::OrFail;
-use crate::interrupt::Interrupt;
+use host::failure::OrFail;
+use host::interrupt::Interrupt;
 
 /// Runs what the command line says.
 ///
 /// # Errors
-/// Whatever went wrong, mostly a [`crate::failure::Failure`] with the next step.
+/// Whatever went wrong, mostly a [`host::failure::Failure`] with the next step.
 pub fn run(cli: Cli) -> Result<()> {
     // Only where something must be brought to an end in order: elsewhere Ctrl-C ends the program as it ends any other.
     let interrupt = || {

@@ -9,15 +9,17 @@ use serde_json::json;
 use super::{bridge, demo, flash};
 use crate::chip::{Options, Watch, Watched};
 use crate::cli::Demo;
-use crate::emulator::{Emulator, Setup, find_firmware};
-use crate::failure::Failure;
-use crate::host_link::HostLink;
-use crate::interrupt::Interrupt;
-use crate::poses::Motion;
+use crate::progress::Person;
 use crate::run::End;
-use crate::stats::seconds;
 use crate::tell::Tell;
-use crate::{model, out, reading};
+use crate::{out, reading};
+use host::chip::emulator::{Emulator, Setup, find_firmware};
+use host::chip::link::HostLink;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::stats::seconds;
+use host::training::model;
+use host::training::motion::Motion;
 
 /// The virtual sensors boot in 650 ms and are brought up within a few seconds.
 const FRAME_WAIT: Duration = Duration::from_secs(20);
@@ -30,7 +32,7 @@ const PAUSE: Duration = Duration::from_millis(100);
 pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let motion = reading::ended_by(interrupt, "the recording", || {
-        Motion::open_for_training(options.poses.as_deref(), options.seed)
+        Motion::open_for_training(options.poses.as_deref(), options.seed, &Person)
     })?;
     // What is missing is said before the training, not after it.
     let firmware = find_firmware(options.firmware.as_deref())?;

@@ -3,9 +3,9 @@
 use anyhow::Result;
 
 use crate::cli::Ports;
-use crate::failure::OrFail;
-use crate::ports::{Listed, list};
 use crate::{out, say};
+use host::failure::OrFail;
+use host::lines::list::{Listed, list};
 
 /// Lists the ports.
 ///

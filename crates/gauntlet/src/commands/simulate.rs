@@ -13,11 +13,16 @@ use rig::pty::{Handle, PtyDevice};
 
 use super::gripper::Model;
 use crate::cli::Simulate;
-use crate::failure::{Failure, OrFail};
-use crate::interrupt::Interrupt;
-use crate::port::BAUD;
-use crate::poses::Motion;
-use crate::{probe, realtime, say, tcp};
+use crate::played;
+use crate::progress::Person;
+use crate::say;
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::lines::port::BAUD;
+use host::lines::tcp;
+use host::probe;
+use host::realtime;
+use host::training::motion::Motion;
 
 /// How often the wait for Ctrl-C looks around.
 const WATCH: Duration = Duration::from_secs(3600);
@@ -34,7 +39,7 @@ const GRIPPER: &str = "/tmp/gripper";
 pub(super) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     let [glove_place, gripper_place] = places(options)?;
     let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
-    let motion = Motion::open(options.poses.as_deref(), options.seed)?;
+    let motion = Motion::open(options.poses.as_deref(), options.seed, &Person)?;
     let glove = glove_place
         .map(|path| Glove::start(&motion, path))
         .transpose()?;
@@ -88,7 +93,7 @@ impl Glove {
     /// Makes one that `link` leads to.
     fn start(motion: &Motion, link: &Path) -> Result<Self> {
         let config = rig::glove::Config::at_baud(BAUD);
-        let device = VirtualGlove::new(motion.virtual_hand(), config);
+        let device = VirtualGlove::new(played::virtual_hand(motion), config);
         let handle = spawn(Box::new(device.clone()), link)?;
         Ok(Self { device, handle })
     }
@@ -152,7 +157,7 @@ impl Simulated {
 
 fn probe_gripper(place: &Path, model: Model, interrupt: &Interrupt) -> Result<()> {
     match model {
-        Model::ThreeFinger => probe::open_gripper(place, interrupt).map(drop),
+        Model::ThreeFinger => probe::open_gripper(place, &Person, interrupt).map(drop),
         other => super::gripper::probe(place, other, interrupt),
     }
 }

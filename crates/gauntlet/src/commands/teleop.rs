@@ -10,15 +10,21 @@ use gripper::{Activation, Status};
 use serde_json::json;
 
 use crate::cli::{Hand, Teleop};
-use crate::failure::Failure;
-use crate::interrupt::Interrupt;
-use crate::platform::Clock;
-use crate::port::BAUD;
-use crate::record::AXES;
+use crate::progress::Person;
 use crate::run::{Options, Run};
-use crate::session::{Order, Parts, Session, Snapshot};
 use crate::tell::Tell;
-use crate::{diagnose, model, out, outputs, ports, probe, words};
+use crate::{out, outputs};
+use host::clock::Clock;
+use host::diagnose;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::lines::list;
+use host::lines::port::BAUD;
+use host::probe;
+use host::session::record::AXES;
+use host::session::{Order, Parts, Session, Snapshot};
+use host::training::model;
+use host::words;
 
 /// Bring-up of 16 sensors: a reset of 650 ms, two mode changes each, and time to spare.
 const FRAME_WAIT: Duration = Duration::from_secs(15);
@@ -46,14 +52,14 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     if let Some(path) = &options.log {
         outputs::check_new(path)?;
     }
-    let image = model::weights(&options.model, None)?.image;
+    let image = model::weights(&options.model, None, &Person)?.image;
     let config = config(options.hand)?;
     for path in [&options.glove, &options.gripper] {
-        if let Some(warning) = ports::latency_warning(path) {
+        if let Some(warning) = list::latency_warning(path) {
             tell.say(format_args!("warning: {}: {warning}", path.display()));
         }
     }
-    let (gripper, status) = probe::open_gripper_with(&options.gripper, line, interrupt)?;
+    let (gripper, status) = probe::open_gripper_with(&options.gripper, line, &Person, interrupt)?;
     tell.say(format_args!(
         "gripper  {}  answers, {}",
         options.gripper.display(),
@@ -145,7 +151,7 @@ fn config(hand: Hand) -> Result<bridge::Config<AXES>> {
         },
         ..bridge::Settings::default()
     };
-    bridge::Config::new(settings).map_err(crate::failure::told)
+    bridge::Config::new(settings).map_err(host::failure::told)
 }
 
 /// How the bring-up ended.

@@ -10,7 +10,7 @@ use ratatui::widgets::{Block, Paragraph};
 use super::bars::{Cell, axis, signed};
 use super::small::{self, wrapped};
 use super::view::{Axis, Finger, View, count, old};
-use crate::stats::{seconds, short_or_dash};
+use host::stats::{seconds, short_or_dash};
 
 pub(super) const DIM: Style = Style::new().add_modifier(Modifier::DIM);
 pub(super) const BOLD: Style = Style::new().add_modifier(Modifier::BOLD);

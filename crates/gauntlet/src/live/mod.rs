@@ -18,8 +18,8 @@ pub use draw::draw;
 pub use small::LEAST;
 pub use view::{Axis, Finger, View};
 
-use crate::platform::since_boot;
 use crate::{out, say};
+use host::clock::since_boot;
 use keys::{Keyboard, hung_up};
 use raw::Raw;
 

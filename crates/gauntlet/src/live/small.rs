@@ -7,7 +7,7 @@ use ratatui::widgets::Paragraph;
 
 use super::draw::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines};
 use super::view::{View, count, old};
-use crate::stats::short_or_dash;
+use host::stats::short_or_dash;
 
 /// The least terminal that shows state, faults and axes: columns, rows.
 pub const LEAST: (u16, u16) = (30, 7);

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::stats::short_or_dash;
+use host::stats::short_or_dash;
 
 /// One finger's five angles.
 #[derive(Debug, Clone, Copy, PartialEq)]

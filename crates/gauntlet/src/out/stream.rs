@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use rustix::io::Errno;
 
-use crate::interrupt;
+use host::interrupt;
 
 /// Bytes that may wait. Only a program that prints much for a slow reader ever waits for room.
 const ROOM: usize = 1 << 18;

@@ -6,9 +6,9 @@ use anyhow::Result;
 use bridge::calibration::{Refusal, Try};
 
 use super::Run;
-use crate::failure::Failure;
-use crate::session::Order;
 use crate::tell::Tell;
+use host::failure::Failure;
+use host::session::Order;
 
 /// For a person to lay the hand flat and hold it still.
 pub const WAIT: Duration = Duration::from_secs(30);

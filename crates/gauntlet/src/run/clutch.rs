@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bridge::clutch::Position;
 
 use super::Run;
-use crate::session::Order;
+use host::session::Order;
 
 /// After this long the bridge has seen that the clutch was closed.
 const CLUTCH_SETTLES: Duration = Duration::from_millis(500);

@@ -4,11 +4,11 @@ use anyhow::Result;
 use bridge::{HoldReason, State};
 
 use super::Summary;
-use crate::failure::Failure;
 use crate::note;
-use crate::session_log::Written;
-use crate::stopped::Stopped;
 use crate::tell::Tell;
+use host::failure::Failure;
+use host::recording::Written;
+use host::session::stopped::Stopped;
 
 /// How everything was when the run ended, before the clutch was opened.
 #[derive(Debug, Clone, PartialEq)]
@@ -206,8 +206,8 @@ pub fn first_failure<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::realtime::Scheduling;
     use crate::run::Numbers;
+    use host::realtime::Scheduling;
 
     fn finished(stopped: Result<Stopped>, ending: Option<Ending>, fault: Option<&str>) -> Finished {
         Finished {

@@ -8,9 +8,9 @@ use gripper::Instant;
 use super::replies::Failed;
 use super::summary::rounded;
 use super::{MOVED_COUNTS, Obeyed, Summary};
-use crate::realtime::Scheduling;
-use crate::record::{AXES, Record, Sort};
-use crate::stats::{Percentiles, Rate};
+use host::realtime::Scheduling;
+use host::session::record::{AXES, Record, Sort};
+use host::stats::{Percentiles, Rate};
 
 /// Counters of a run, in bounded memory.
 #[derive(Debug, Default)]
@@ -179,8 +179,8 @@ impl Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::record::{Command, Frame, Imu};
     use gripper::{Activation, Contact, Fault, Motion, Status};
+    use host::session::record::{Command, Frame, Imu};
 
     fn at(us: u64) -> Instant {
         Instant::from_ticks(us)

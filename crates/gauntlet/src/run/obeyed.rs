@@ -3,8 +3,8 @@
 
 use gripper::{Contact, Status};
 
-use crate::record::AXES;
-use crate::words::AXIS_WORDS;
+use host::session::record::AXES;
+use host::words::AXIS_WORDS;
 
 /// Counts of position that are a motion: more than noise of the measured position.
 pub const MOVED_COUNTS: u8 = 4;

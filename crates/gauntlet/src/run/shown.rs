@@ -12,10 +12,10 @@ use gripper::{Activation, Contact, Status};
 
 use super::replies::Replies;
 use crate::live::{Axis, Finger};
-use crate::realtime::Scheduling;
-use crate::record::AXES;
-use crate::session::Snapshot;
-use crate::words;
+use host::realtime::Scheduling;
+use host::session::Snapshot;
+use host::session::record::AXES;
+use host::words;
 
 /// Faults shown at once.
 const SHOWN_FAULTS: usize = 5;

@@ -5,8 +5,8 @@ use std::time::Duration;
 use serde::Serialize;
 
 use super::replies::Failed;
-use crate::realtime::Scheduling;
-use crate::stats::{seconds, short_or_dash};
+use host::realtime::Scheduling;
+use host::stats::{seconds, short_or_dash};
 
 /// One late step in so many is more than a computer with time for the bridge shows.
 const LATE_ONE_IN: u64 = 50;

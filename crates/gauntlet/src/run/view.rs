@@ -6,7 +6,7 @@ use bridge::clutch::Position;
 
 use super::{Options, Run, shown};
 use crate::live::View;
-use crate::session::Snapshot;
+use host::session::Snapshot;
 
 impl Run {
     pub(super) fn view(&mut self, options: &Options, elapsed: Duration, keys: bool) -> View {

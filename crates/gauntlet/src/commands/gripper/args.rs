@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
-use gripper::registers::{three_finger, two_finger};
-
-use crate::line::{Line, Settings};
+use gripper::registers::three_finger;
+use host::lines::{Line, Model, Settings};
 
 /// Options of `gripper`.
 #[derive(Debug, Args)]
@@ -45,51 +45,16 @@ pub enum Verb {
     Watch(Watch),
 }
 
-/// Which gripper.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Model {
-    /// 3-Finger Adaptive Gripper.
-    #[value(name = "3f")]
-    ThreeFinger,
-    /// 2F-85.
-    #[value(name = "2f85")]
-    TwoFinger85,
-    /// 2F-140.
-    #[value(name = "2f140")]
-    TwoFinger140,
-    /// Hand-E.
-    #[value(name = "hande")]
-    HandE,
-}
-
-impl Model {
-    /// The maker's name for it.
-    pub fn name(self) -> &'static str {
-        match self.two_finger() {
-            Some(model) => model.name(),
-            None => "3-Finger gripper",
-        }
-    }
-
-    /// What the command line calls it.
-    pub fn option(self) -> &'static str {
-        match self {
-            Self::ThreeFinger => "3f",
-            Self::TwoFinger85 => "2f85",
-            Self::TwoFinger140 => "2f140",
-            Self::HandE => "hande",
-        }
-    }
-
-    /// The 2-Finger or Hand-E model it is, if it is one.
-    pub fn two_finger(self) -> Option<two_finger::Model> {
-        match self {
-            Self::ThreeFinger => None,
-            Self::TwoFinger85 => Some(two_finger::Model::TwoFinger85),
-            Self::TwoFinger140 => Some(two_finger::Model::TwoFinger140),
-            Self::HandE => Some(two_finger::Model::HandE),
-        }
-    }
+/// Takes a gripper's name on the command line.
+pub fn model_parser() -> impl TypedValueParser<Value = Model> {
+    let names = Model::ALL.map(|model| {
+        let help = match model {
+            Model::ThreeFinger => "3-Finger Adaptive Gripper",
+            Model::TwoFinger85 | Model::TwoFinger140 | Model::HandE => model.name(),
+        };
+        PossibleValue::new(model.option()).help(help)
+    });
+    PossibleValuesParser::new(names).try_map(|name: String| name.parse::<Model>())
 }
 
 /// Where the gripper is and how to talk about it.
@@ -99,7 +64,7 @@ pub struct Target {
     #[arg(long, value_name = "PORT")]
     pub gripper: PathBuf,
     /// Which gripper it is.
-    #[arg(long = "gripper-model", visible_alias = "model", value_name = "MODEL", value_enum, default_value_t = Model::ThreeFinger)]
+    #[arg(long = "gripper-model", visible_alias = "model", value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
     pub model: Model,
     /// Take it for a --gripper-model even if it answers as one of another family: only for a gripper whose firmware answers what
     /// its manual does not name. A command for another family moves the fingers elsewhere.
@@ -113,7 +78,7 @@ pub struct Target {
     pub baud: Option<u32>,
     /// Wait so much longer for answers, milliseconds (1 to 1000): for a serial tunnel or a slow network. A move then
     /// leads by smaller steps.
-    #[arg(long, value_name = "MS", value_parser = crate::line::patience)]
+    #[arg(long, value_name = "MS", value_parser = host::lines::patience)]
     pub patience: Option<Duration>,
     /// Show the status block's bytes too.
     #[arg(long)]
@@ -172,7 +137,7 @@ impl Target {
         // In steps of 100 ms.
         let enough = Duration::from_millis(100 * (late.as_millis() as u64 / 100 + 1));
         let more = (now + Duration::from_millis(100)).max(enough + Duration::from_millis(100));
-        self.command(verb, Some(more.min(crate::line::MOST_PATIENCE)))
+        self.command(verb, Some(more.min(host::lines::MOST_PATIENCE)))
     }
 
     /// `gauntlet doctor` for the same gripper, to be pasted.
@@ -186,10 +151,8 @@ impl Target {
 
     fn words(&self, verb: &str, patience: Option<Duration>) -> String {
         let mut text = format!("`gauntlet {verb} --gripper {}", quoted(&self.gripper));
-        if let Some(value) = self.model.to_possible_value()
-            && self.model != Model::ThreeFinger
-        {
-            text.push_str(&format!(" --gripper-model {}", value.get_name()));
+        if self.model != Model::ThreeFinger {
+            text.push_str(&format!(" --gripper-model {}", self.model.option()));
         }
         if let Some(unit) = self.unit {
             text.push_str(&format!(" --unit {unit}"));

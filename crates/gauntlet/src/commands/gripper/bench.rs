@@ -8,10 +8,11 @@ use gripper::registers::{three_finger, two_finger};
 use gripper::travel::Speed;
 use gripper::{Gripper, Status, link};
 
-use crate::interrupt::Interrupt;
-use crate::line::{Line, ticks};
-use crate::platform::Clock;
-use crate::tcp;
+use host::clock::Clock;
+use host::clock::ticks;
+use host::interrupt::Interrupt;
+use host::lines::Line;
+use host::lines::tcp;
 
 /// Time a gripper gets to answer a first status read.
 pub const ANSWER_WAIT: Duration = Duration::from_secs(3);
@@ -84,7 +85,7 @@ impl Bench<4> for ThreeFinger<Line> {
         self.mode() == Some(three_finger::Mode::Scissor)
     }
     fn names(&self) -> (&'static str, [&'static str; 4]) {
-        ("3-Finger gripper", crate::words::AXIS_WORDS)
+        ("3-Finger gripper", host::words::AXIS_WORDS)
     }
     fn facts(&self) -> Vec<(&'static str, String)> {
         let Some(block) = self.raw_status() else {

@@ -12,8 +12,8 @@ use super::progress::{Judgement, Progress, Rest, STUCK};
 use super::proof::{Proof, Step};
 use super::refusal::{can_hold, may_move};
 use super::{Doing, Move, table};
-use crate::failure::Failure;
-use crate::line::ticks;
+use host::clock::ticks;
+use host::failure::Failure;
 
 /// Most counts a command may be from where an axis truly is.
 pub(super) const LEAD: u8 = 40;

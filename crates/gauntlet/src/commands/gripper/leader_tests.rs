@@ -1,16 +1,17 @@
 //! A move of a scripted gripper on virtual time, seed by seed.
 
-use super::super::args::{Model, Target};
+use super::super::args::Target;
 use super::super::bench::Waiter;
 use super::*;
-use crate::interrupt::Interrupt;
-use crate::platform::Clock;
-use crate::tcp;
 use crate::tell::Tell;
 use gripper::driver::{Control, Outcome, Task};
 use gripper::registers::three_finger;
 use gripper::travel::Speed;
 use gripper::{Contact, Gripper};
+use host::clock::Clock;
+use host::interrupt::Interrupt;
+use host::lines::Model;
+use host::lines::tcp;
 use std::path::Path;
 
 /// One exchange, µs.

@@ -21,13 +21,14 @@ use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::registers::{Kind, Severity};
 use gripper::{Activation, Fault, Status};
 
-use crate::failure::Failure;
-use crate::interrupt::Interrupt;
-use crate::line::Line;
 use crate::tell::Tell;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::lines::Line;
 
-pub use args::{Grasp, Gripper, Mode, Model, Move, Release, Target, Verb, Watch};
+pub use args::{Grasp, Gripper, Mode, Move, Release, Target, Verb, Watch, model_parser};
 pub(super) use bench::{Bench, Waiter};
+pub use host::lines::Model;
 
 impl Verb {
     fn target(&self) -> &Target {
@@ -47,7 +48,7 @@ impl Verb {
 /// A failure that says why it did not happen and what to do.
 pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
     let target = options.verb.target();
-    let is_tcp = crate::tcp::Address::parse(&target.gripper)?.is_some();
+    let is_tcp = host::lines::tcp::Address::parse(&target.gripper)?.is_some();
     if is_tcp && target.model != Model::ThreeFinger {
         return Err(only_three_finger_on_tcp().into());
     }
@@ -208,9 +209,9 @@ fn no_answer<B: Bench<X>, const X: usize>(
             config.unit
         );
         let next = match error {
-            crate::tcp::Error::Timeout => format!(
+            host::lines::tcp::Error::Timeout => format!(
                 "{}; ending other programs that are connected to it; another --unit (2 by default); the gripper's power",
-                target.patient_for("status", crate::line::MOST_PATIENCE)
+                target.patient_for("status", host::lines::MOST_PATIENCE)
             ),
             error => error.next_step().to_owned(),
         };

@@ -16,7 +16,7 @@ use super::bench::Bench;
 use super::leader::{End, LEAD, Leader, SILENCE};
 use super::refusal::may_move;
 use super::{Doing, Move};
-use crate::failure::Failure;
+use host::failure::Failure;
 
 /// The slowest full stroke takes 7 s; one that needs longer is stuck.
 const MOVE_WAIT: Duration = Duration::from_secs(15);

@@ -71,7 +71,7 @@ fn one_number_is_for_all_and_four_are_checked_for_interference() {
     assert!(positions::<4>(&[1, 2], "").is_err());
     assert!(positions::<1>(&[1, 2, 3, 4], "").is_err());
     let refused = positions::<4>(&[200, 200, 200, 200], "").unwrap_err();
-    assert_eq!(refused.exit_code(), crate::failure::EXIT_USAGE);
+    assert_eq!(refused.exit_code(), host::failure::EXIT_USAGE);
     let near: Vec<u8> = refused.next_step()[5..]
         .split_once(" (")
         .unwrap()

@@ -5,7 +5,7 @@ use gripper::{Activation, Fault, Instant, Status};
 
 use super::args::Target;
 use super::leader::{Leader, since};
-use crate::failure::Failure;
+use host::failure::Failure;
 
 impl<const X: usize> Leader<'_, X> {
     pub(super) fn implausible(&self, status: &Status<X>, axis: usize) -> Failure {

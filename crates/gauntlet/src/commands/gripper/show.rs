@@ -9,8 +9,9 @@ use gripper::{Activation, Fault, Status};
 
 use super::bench::Bench;
 use super::{Doing, is_refusing, table};
-use crate::failure::Failure;
-use crate::{out, say, words};
+use crate::{out, say};
+use host::failure::Failure;
+use host::words;
 
 /// `watch` shows changes at most this often.
 const WATCH_STEP: Duration = Duration::from_millis(100);
@@ -75,7 +76,7 @@ impl<B> Doing<'_, B> {
     {
         let patience = self.target.settings().patience();
         let mut judge =
-            Plausibility::new(self.driver.speed()).patient(crate::line::ticks(4 * patience));
+            Plausibility::new(self.driver.speed()).patient(host::clock::ticks(4 * patience));
         judge.take(&first, first.stamp);
         let (mut newest, mut seen, mut doubts) = (first, 1, 0);
         let waiter = self.waiter.clone();

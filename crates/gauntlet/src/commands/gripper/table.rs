@@ -4,7 +4,7 @@ use gripper::{Contact, Fault, Status};
 use serde_json::{Value, json};
 
 use super::bench::Bench;
-use crate::words;
+use host::words;
 
 /// Software limits lie inside the mechanical stops, at most so many counts from either end.
 pub const LIMITS: u8 = 30;

@@ -9,8 +9,8 @@ use gripper::{Activation, Instant};
 
 use super::args::Target;
 use super::bench::{Bench, Waiter};
-use crate::failure::Failure;
-use crate::line::ticks;
+use host::clock::ticks;
+use host::failure::Failure;
 
 /// Longer than every task's own deadline, for a driver that is never polled to its end.
 const TASK_WAIT: Duration = Duration::from_secs(65);

@@ -14,7 +14,7 @@ use trainer::data::{write_pairs, write_samples};
 use super::Bench;
 use super::tables::save;
 use super::what::{APPENDIX, What};
-use crate::failure::told;
+use host::failure::told;
 
 const SP1: [Source; 1] = [Source::Shape(ShapePair::Sp1)];
 /// d̄, VO, d-Knn, NMSE.

@@ -14,9 +14,10 @@ use trainer::hand::table3::POSES;
 
 use super::Bench;
 use super::what::What;
-use crate::failure::told;
-use crate::poses::Motion;
-use crate::record::{AXES, AXIS_NAMES};
+use crate::played;
+use host::failure::told;
+use host::session::record::{AXES, AXIS_NAMES};
+use host::training::motion::Motion;
 
 /// Poses of Figure 12: a quarter of a second apart, six seconds in all.
 const SNAPSHOTS: usize = 25;
@@ -180,7 +181,7 @@ impl Bench<'_> {
         };
         let six_s = (SNAPSHOTS - 1) as f64 * SNAPSHOT_S;
         let last = (length_s - six_s).max(0.0) as u32;
-        let mut source = motion.source();
+        let mut source = played::source(motion);
         let mut window = |second: u32, count: usize, step_s: f64| -> Vec<[f32; JOINT_COUNT]> {
             let start_s = from_s + f64::from(second);
             (0..count)

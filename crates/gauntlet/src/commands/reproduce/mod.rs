@@ -18,12 +18,13 @@ use trainer::network::Initialisation;
 use trainer::optimizer::LearningRate;
 
 use super::train::{Schedule, deviation};
-use crate::failure::{OrFail, told};
-use crate::interrupt::Interrupt;
-use crate::poses::Motion;
-use crate::stats::seconds;
+use crate::progress::Person;
 use crate::tell::Tell;
 use crate::{out, reading};
+use host::failure::{OrFail, told};
+use host::interrupt::Interrupt;
+use host::stats::seconds;
+use host::training::motion::Motion;
 use what::{Frame, What};
 use work::Work;
 
@@ -134,7 +135,7 @@ pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let motion = match &options.poses {
         Some(path) => Some(reading::ended_by(interrupt, "the recording", || {
-            Motion::open_for_training(Some(path), 0)
+            Motion::open_for_training(Some(path), 0, &Person)
         })?),
         None => None,
     };

@@ -12,7 +12,7 @@ use trainer::whole_file;
 
 use super::Bench;
 use super::what::What;
-use crate::failure::OrFail;
+use host::failure::OrFail;
 
 /// What the paper's text has lost, and what there is not.
 const NONE: &str = "—";

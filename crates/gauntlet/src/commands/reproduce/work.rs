@@ -8,10 +8,10 @@ use anyhow::Result;
 use paper::{Cell, Error, Kept, Laboratory, Store, Watch, run_all};
 
 use super::what::{Frame, What};
-use crate::failure::{Failure, told};
-use crate::interrupt::Interrupt;
 use crate::progress::Progress;
 use crate::tell::Tell;
+use host::failure::{Failure, told};
+use host::interrupt::Interrupt;
 
 /// The whole run's trainings.
 pub struct Work<'a> {

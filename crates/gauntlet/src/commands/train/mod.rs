@@ -13,17 +13,18 @@ use trainer::model::Model;
 use trainer::network::Initialisation;
 
 pub(in crate::commands) use args::deviation;
-pub use args::{CoverageArgs, PairChoice, PairKind, Schedule, Train};
+pub use args::{CoverageArgs, Schedule, Train};
 
-use crate::failure::{Failure, told};
-use crate::interrupt::Interrupt;
 use crate::outputs::Kind;
-use crate::poses::Motion;
-use crate::quality::{Measured, Quality};
-use crate::stats::seconds;
+use crate::progress::Person;
 use crate::tell::Tell;
-use crate::training::{Course, Ended, Task, domains, hand};
 use crate::{out, outputs, reading};
+use host::failure::{Failure, told};
+use host::interrupt::Interrupt;
+use host::stats::seconds;
+use host::training::motion::Motion;
+use host::training::quality::{Measured, Quality};
+use host::training::{Course, Ended, Task, domains, hand};
 
 /// Trains on a recording of a hand, or on samples of any two domains.
 ///
@@ -37,7 +38,7 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     })?;
     let course = course(options);
     describe(options, &task, &course, &tell);
-    let mut learned = match crate::training::learn(&mut task, &course, interrupt)? {
+    let mut learned = match host::training::learn(&mut task, &course, &Person, interrupt)? {
         Ended::Trained(learned) => learned,
         Ended::StoppedAt(epoch) => return stopped(options, epoch, &tell),
     };
@@ -88,7 +89,7 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
 fn task(options: &Train, tell: &Tell) -> Result<Task> {
     match (&options.poses, &options.input, &options.target) {
         (Some(poses), ..) => {
-            let motion = Motion::open_for_training(Some(poses), options.seed)?;
+            let motion = Motion::open_for_training(Some(poses), options.seed, &Person)?;
             tell.say(format_args!("poses      {}", motion.describe()));
             let pairs = hand_pairs(options);
             hand::task(&motion, &pairs, options.seed, options.hold_out)
@@ -202,6 +203,7 @@ fn hand_pairs(options: &Train) -> hand::HandPairs<'_> {
         choice: options.pairs,
         file: options.pairs_file.as_deref(),
         start_pairs: !options.no_start_pairs,
+        reporter: &Person,
     }
 }
 
@@ -217,6 +219,7 @@ fn domain_files<'a>(options: &'a Train, input: &'a Path, target: &'a Path) -> do
         force: options.force,
         seed: options.seed,
         hold_out: options.hold_out,
+        reporter: &Person,
     }
 }
 
@@ -240,7 +243,6 @@ fn course(options: &Train) -> Course {
             .or_else(|| options.resume.clone()),
         resume: options.resume.clone(),
         stop_at: options.stop_at.map(|epoch| epoch as usize),
-        quiet: false,
     }
 }
 
@@ -253,7 +255,7 @@ fn describe(options: &Train, task: &Task, course: &Course, tell: &Tell) {
     ));
     if options
         .pairs
-        .is_some_and(|choice| choice.kind == PairKind::Table3)
+        .is_some_and(|choice| choice.kind == host::training::PairKind::Table3)
     {
         for pose in &POSES[..task.start_pairs().min(POSES.len())] {
             tell.say(format_args!(

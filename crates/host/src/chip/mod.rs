@@ -1,0 +1,4 @@
+//! A bridge on a chip: the host protocol, and the chip as an emulator has it.
+
+pub mod emulator;
+pub mod link;

@@ -1,0 +1,266 @@
+//! A glove's layers: port, serial bridge (SC18IM), I²C multiplexer (TCA9548A), 16 sensors.
+
+mod bridge_line;
+mod sensors;
+
+use std::path::Path;
+use std::time::Duration;
+
+use glove::hand::SEGMENT_COUNT;
+use glove::mux;
+use glove::scan::Health;
+
+use super::Findings;
+use super::answer::Came;
+use super::place::quoted;
+use super::search::{UNIT, persist};
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::lines::list;
+use crate::lines::port::{BAUD, Port};
+use bridge_line::{UNKEPT_NEXT, ask, nobody, survey, unkept};
+
+/// The SC18IM's speed after power-on.
+const RESET_BAUD: u32 = 9_600;
+/// Speeds it may have been left at, likeliest first.
+const BAUDS: [u32; 4] = [BAUD, RESET_BAUD, 460_800, 230_400];
+/// Read the register I2CStat: `R 0A P`.
+const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
+/// Write the register I2CTO (09), 3 × 4.44 ms, on: else a bus that hangs keeps the bridge silent for ever.
+const SET_TIMEOUT: [u8; 4] = [0x57, 0x09, 0x07, 0x50];
+/// Addresses a TCA9548A can have; the first is the one every program here expects.
+const MULTIPLEXERS: std::ops::RangeInclusive<u8> = mux::ADDRESS..=mux::ADDRESS + 7;
+/// I2CStat: done, nobody acknowledged the address, the bus hung.
+const DONE: u8 = 0xF0;
+const NO_ACKNOWLEDGE: u8 = 0xF1;
+const BUS_HUNG: u8 = 0xF8;
+/// For its one byte: 4.2 ms at 9600 baud, an adapter's latency timer twice, a PC with other work.
+const WAIT: Duration = Duration::from_millis(80);
+
+/// Finds out which layer of the glove at `path` fails. Ends within half a minute, whatever comes.
+pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
+    let mut findings = Findings::default();
+    if let Some((port, baud)) = find(path, &BAUDS, &mut findings, interrupt) {
+        let mut port = port;
+        if let Some(what) = unkept(&mut port, interrupt) {
+            findings.wrong("bridge", what, UNKEPT_NEXT);
+        } else if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
+            sensors::sensors(port, baud, address, &mut findings, interrupt);
+        }
+    }
+    findings
+}
+
+/// Why no glove answers at `path`, in a few seconds. The failure begins with `what`; the next step can be pasted.
+pub fn no_glove(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
+    let mut findings = Findings::default();
+    let found = find(path, &[BAUD, RESET_BAUD], &mut findings, interrupt);
+    let doctor = format!("`gauntlet doctor --glove {}`", quoted(path));
+    match findings.first_wrong() {
+        Some(wrong) => {
+            let next = wrong.next.clone().unwrap_or_default();
+            Failure::new(
+                format!("{what}: {}", wrong.what),
+                format!("{next}; then {doctor}"),
+            )
+        }
+        None if found.is_some() => {
+            Failure::new(format!("{what} in time, though it answers now"), doctor)
+        }
+        None => Failure::new(what, doctor),
+    }
+}
+
+/// What is wrong with sensors that give no orientation, as `doctor` says it.
+pub fn missing_sensors(health: &[Health; SEGMENT_COUNT]) -> Findings {
+    let mut findings = Findings::default();
+    sensors::judge(health, &mut findings);
+    findings
+}
+
+/// Why no sensor of the glove at `path` gives an orientation, though its serial bridge answers. The failure begins with
+/// `what`.
+pub fn no_sensors(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
+    let findings = glove(path, interrupt);
+    match findings.first_wrong() {
+        Some(wrong) => Failure::new(
+            format!("{what}: {}", wrong.what),
+            wrong.next.clone().unwrap_or_default(),
+        ),
+        None => Failure::new(
+            format!("{what} in time, though they do now"),
+            "the same again",
+        ),
+    }
+}
+
+/// A register of the glove's serial bridge that does not keep what the driver writes into it: no sensor would answer.
+///
+/// # Errors
+/// The failure that names it.
+pub fn keeps_registers(path: &Path, port: &mut Port, interrupt: &Interrupt) -> Result<(), Failure> {
+    match unkept(port, interrupt) {
+        None => Ok(()),
+        Some(what) => Err(Failure::new(
+            format!("the glove on {} cannot be used: {what}", path.display()),
+            UNKEPT_NEXT,
+        )),
+    }
+}
+
+/// The glove's serial bridge at one of these speeds; else what is there instead is told.
+fn find(
+    path: &Path,
+    bauds: &[u32],
+    findings: &mut Findings,
+    interrupt: &Interrupt,
+) -> Option<(Port, u32)> {
+    match Port::open(path, BAUD) {
+        Ok(_) => findings.good("port", format!("{} opens", path.display())),
+        Err(error) => {
+            findings.failure("port", &Failure::from(error));
+            return None;
+        }
+    }
+    if let Some((what, next)) = list::latency_fault(path) {
+        findings.wrong("port", what, next);
+    }
+    let mut seen = Vec::new();
+    for &baud in bauds {
+        let Ok(mut port) = Port::open(path, baud) else {
+            continue;
+        };
+        let survey = survey(&mut port, interrupt);
+        if let Some(status) = survey.status() {
+            bridge(baud, status, findings);
+            survey.tell(findings);
+            return Some((port, baud));
+        }
+        seen.push((baud, survey));
+    }
+    if interrupt.asked() {
+        findings.note("bridge", "interrupted", "again");
+    } else if gripper_answers(path, interrupt) {
+        findings.wrong(
+            "bridge",
+            "this is the gripper's port: a Modbus status comes, no glove",
+            "the other port for --glove (`gauntlet ports`)",
+        );
+    } else {
+        nobody(&seen, findings);
+    }
+    None
+}
+
+/// Whether a glove's serial bridge answers at `path`, at the speed it is set to or that of its power-on.
+pub(super) fn glove_answers(path: &Path, interrupt: &Interrupt) -> bool {
+    [BAUD, RESET_BAUD].into_iter().any(|baud| {
+        Port::open(path, baud).is_ok_and(|mut port| {
+            // Noise may look like it once.
+            (0..3).all(|_| {
+                let heard = ask(&mut port, &READ_STATUS, 1, WAIT, interrupt);
+                matches!(heard[..], [0xF0..=0xF8])
+            })
+        })
+    })
+}
+
+fn gripper_answers(path: &Path, interrupt: &Interrupt) -> bool {
+    Port::open(path, BAUD).is_ok_and(|mut port| {
+        let came = persist(&mut port, UNIT, BAUD, WAIT, interrupt);
+        matches!(came, Came::Answer(_))
+    })
+}
+
+fn bridge(baud: u32, status: u8, findings: &mut Findings) {
+    let what = format!("the serial bridge (SC18IM) answers at {baud} baud");
+    match baud {
+        BAUD => findings.good("bridge", what),
+        RESET_BAUD => findings.note(
+            "bridge",
+            format!("{what}, as after power-on"),
+            "nothing: `gauntlet teleop` switches it to 115200",
+        ),
+        _ => findings.wrong(
+            "bridge",
+            format!("{what}: another program left it there"),
+            "unplug the glove and plug it in again: it then speaks 9600 baud, which `teleop` expects",
+        ),
+    }
+    // The status is that of the last transfer, which may have been somebody else's.
+    if status == BUS_HUNG {
+        findings.note(
+            "bridge",
+            "I2CStat is F8: the last transfer on the I2C bus timed out",
+            "looking at SDA and SCL if sensors are missing below",
+        );
+    }
+}
+
+/// The address the multiplexer answers at; asked by deselecting its channels, which changes nothing that lasts.
+fn multiplexer(port: &mut Port, findings: &mut Findings, interrupt: &Interrupt) -> Option<u8> {
+    // No answer belongs to this; the next question shows whether it was understood.
+    ask(port, &SET_TIMEOUT, 0, Duration::ZERO, interrupt);
+    let mut status = |address: u8| {
+        let question = [0x53, address << 1, 0x01, 0x00, 0x50, 0x52, 0x0A, 0x50];
+        (0..3).find_map(|_| match ask(port, &question, 1, WAIT, interrupt)[..] {
+            [status @ 0xF0..=0xF8] => Some(status),
+            _ => None,
+        })
+    };
+    let expected = mux::ADDRESS;
+    match status(expected) {
+        Some(DONE) => {
+            findings.good(
+                "multiplexer",
+                format!("the I2C multiplexer (TCA9548A) answers at {expected:#04X}"),
+            );
+            return Some(expected);
+        }
+        Some(NO_ACKNOWLEDGE) => {}
+        Some(BUS_HUNG) => {
+            findings.wrong(
+                "bus",
+                "the I2C bus hangs: SDA or SCL is held low (I2CStat F8)",
+                "a short on SDA or SCL, or a chip that holds them: switch the glove off and on; then unplug the multiplexer and look again",
+            );
+            return None;
+        }
+        Some(other) => {
+            findings.wrong(
+                "multiplexer",
+                format!("the I2C multiplexer (TCA9548A at {expected:#04X}) does not take its control byte (I2CStat {other:02X})"),
+                "SDA and SCL between serial bridge and multiplexer, their pull-ups and length",
+            );
+            return None;
+        }
+        None if interrupt.asked() => {
+            findings.note("multiplexer", "interrupted", "again");
+            return None;
+        }
+        None => {
+            findings.wrong(
+                "bridge",
+                "the serial bridge answers one question, then falls silent over a message on the I2C bus",
+                "SDA and SCL (a short keeps the bus busy), the glove's power; then unplug it and plug it in again",
+            );
+            return None;
+        }
+    }
+    let elsewhere = MULTIPLEXERS
+        .skip(1)
+        .find(|address| status(*address) == Some(DONE));
+    match elsewhere {
+        Some(address) => findings.wrong(
+            "multiplexer",
+            format!("the I2C multiplexer (TCA9548A) answers at {address:#04X}, not at {expected:#04X}"),
+            "its address pins A0, A1 and A2 low",
+        ),
+        None => findings.wrong(
+            "multiplexer",
+            format!("the I2C multiplexer (TCA9548A) is missing: nobody acknowledges {expected:#04X} to 0x77 (I2CStat F1)"),
+            "its power, its RESET pin high, SDA and SCL between it and the serial bridge",
+        ),
+    }
+    elsewhere
+}

@@ -1,0 +1,191 @@
+//! Does anybody answer on this port? Asked of each device in its own language, without moving or changing anything.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use embedded_io::{Read, ReadReady, Write};
+use gripper::driver::ThreeFinger;
+use gripper::{Gripper, Status};
+
+use crate::clock::Clock;
+use crate::diagnose;
+use crate::failure::Failure;
+use crate::interrupt::Interrupt;
+use crate::lines::port::{BAUD, Port};
+use crate::lines::{Line, Settings};
+use crate::report::Reporter;
+use crate::session::record::AXES;
+
+/// The SC18IM's speed after a reset.
+const RESET_BAUD: u32 = 9_600;
+/// Read the register I2CStat (0A): `R 0A P`. Answered by one byte, F0 to F8, whatever hangs on the bus.
+const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
+/// Write BRG0 = 30, BRG1 = 00: 7372800 / 115200 − 16 = 0x0030. Works as soon as BRG1 is there.
+const SET_BAUD: [u8; 6] = [0x57, 0x00, 0x30, 0x01, 0x00, 0x50];
+/// Three bytes out and one back take 4.2 ms at 9600 baud; an adapter may keep them back for 16 ms twice.
+const ANSWER_WAIT: Duration = Duration::from_millis(60);
+/// A command cut off by whoever used the port before is forgotten after this (the chip's idle timeout is 655 ms).
+const IDLE: Duration = Duration::from_millis(700);
+/// For the new speed to be in effect.
+const SPEED_WAIT: Duration = Duration::from_millis(5);
+/// Time a gripper gets to answer a status read: a hundred tries, for a machine that is busy.
+const GRIPPER_WAIT: Duration = Duration::from_secs(3);
+/// Pause between two looks at a port.
+const LOOK: Duration = Duration::from_millis(1);
+
+/// A glove that answers.
+#[derive(Debug)]
+pub struct Glove {
+    /// Its port, at 115200 baud.
+    pub port: Port,
+    /// Whether it spoke 9600 baud, as after power-on, and was switched.
+    pub switched: bool,
+}
+
+/// Opens the glove's port and finds its serial multiplexer, at 115200 baud or, fresh from power-on, at 9600, from where
+/// it is switched to 115200.
+///
+/// # Errors
+/// A failure that says whether the port does not open or nobody answers on it, and what to try.
+pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
+    let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+    if answers(&mut port, interrupt) {
+        diagnose::keeps_registers(path, &mut port, interrupt)?;
+        return Ok(Glove {
+            port,
+            switched: false,
+        });
+    }
+    drop(port);
+    let mut slow = Port::open(path, RESET_BAUD).map_err(Failure::from)?;
+    if status_byte(&mut slow, interrupt) && slow.write(&SET_BAUD) == Ok(SET_BAUD.len()) {
+        // All six bytes must have left at the old speed: 6.3 ms.
+        interrupt.sleep(2 * SPEED_WAIT);
+        drop(slow);
+        let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+        interrupt.sleep(SPEED_WAIT);
+        if answers(&mut port, interrupt) {
+            diagnose::keeps_registers(path, &mut port, interrupt)?;
+            return Ok(Glove {
+                port,
+                switched: true,
+            });
+        }
+    }
+    if interrupt.asked() {
+        return Err(Failure::interrupted("while the glove was looked for").into());
+    }
+    let what = format!(
+        "no glove answers on {}, asked for its serial multiplexer (SC18IM) at {BAUD} and {RESET_BAUD} baud",
+        path.display()
+    );
+    Err(diagnose::no_glove(&what, path, interrupt).into())
+}
+
+/// Twice at once, and once more after the time in which a cut-off command is forgotten.
+fn answers(port: &mut Port, interrupt: &Interrupt) -> bool {
+    if status_byte(port, interrupt) || status_byte(port, interrupt) {
+        return true;
+    }
+    !interrupt.sleep(IDLE) && status_byte(port, interrupt)
+}
+
+fn status_byte(port: &mut Port, interrupt: &Interrupt) -> bool {
+    discard(port);
+    if port.write(&READ_STATUS) != Ok(READ_STATUS.len()) {
+        return false;
+    }
+    let end = Instant::now() + ANSWER_WAIT;
+    while Instant::now() < end && !interrupt.sleep(LOOK) {
+        let mut byte = [0];
+        if port.read_ready() == Ok(true) && port.read(&mut byte) == Ok(1) {
+            // More than one byte is noise or somebody else's chatter.
+            interrupt.sleep(2 * LOOK);
+            return (0xF0..=0xF8).contains(&byte[0]) && port.read_ready() == Ok(false);
+        }
+    }
+    false
+}
+
+/// Throws away what is there, 4 kB at most.
+fn discard(port: &mut Port) {
+    for _ in 0..64 {
+        if port.read_ready() != Ok(true) || port.read(&mut [0; 64]).is_err() {
+            return;
+        }
+    }
+}
+
+/// Opens the line of a gripper as delivered, a serial port or `tcp:HOST[:PORT]`, and reads its status.
+///
+/// # Errors
+/// As [`open_gripper_with`].
+pub fn open_gripper(
+    path: &Path,
+    reporter: &dyn Reporter,
+    interrupt: &Interrupt,
+) -> Result<(Line, Status<AXES>)> {
+    open_gripper_with(path, Settings::default(), reporter, interrupt)
+}
+
+/// The same where unit, speed or patience differ from those of a gripper as delivered.
+///
+/// # Errors
+/// A failure that says whether the port does not open or nobody answers on it, what came instead, and what to try.
+pub fn open_gripper_with(
+    path: &Path,
+    settings: Settings,
+    reporter: &dyn Reporter,
+    interrupt: &Interrupt,
+) -> Result<(Line, Status<AXES>)> {
+    let mut port = Line::open(path, settings, interrupt)?;
+    let config = port.driver_config(settings);
+    let clock = Clock::start();
+    let end = Instant::now() + GRIPPER_WAIT;
+    let mut driver = ThreeFinger::new(&mut port, config);
+    let mut other = None;
+    while Instant::now() < end && other.is_none() && !interrupt.sleep(LOOK) {
+        match driver.poll(clock.now()) {
+            Some(Ok(status)) => {
+                drop(driver);
+                return Ok((port, status));
+            }
+            Some(Err(gripper::Error::OtherGripper(kind))) => other = Some(kind),
+            Some(Err(_)) | None => {}
+        }
+    }
+    drop(driver);
+    drop(port);
+    if interrupt.asked() {
+        return Err(Failure::interrupted("while the gripper was looked for").into());
+    }
+    if let Some(kind) = other {
+        return Err(other_gripper(path, kind).into());
+    }
+    let what = format!(
+        "no gripper answers on {} as unit {}",
+        path.display(),
+        config.unit
+    );
+    let asked = diagnose::Asked {
+        settings,
+        model: None,
+        reporter: Some(reporter),
+    };
+    Err(diagnose::no_gripper(&what, path, asked, interrupt).into())
+}
+
+fn other_gripper(path: &Path, kind: gripper::registers::Kind) -> Failure {
+    Failure::new(
+        format!(
+            "a {} answers on {}, and a glove drives the 3-Finger gripper only: nothing was written to it",
+            kind.name(),
+            path.display()
+        ),
+        format!(
+            "`gauntlet gripper move --gripper {} --gripper-model 2f85 --to 100`",
+            path.display()
+        ),
+    )
+}

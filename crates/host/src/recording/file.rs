@@ -1,0 +1,256 @@
+//! The file of a session log, and what of it is whole.
+
+use std::fs::File;
+use std::io::{self, Seek, SeekFrom, Write};
+use std::path::Path;
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
+
+use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
+use mcap::{MAGIC, McapResult, WriteOptions, Writer};
+use rustix::io::Errno;
+
+use super::channels::{self, CHANNELS, Channel};
+use crate::clock::Clock;
+use crate::session::record::Record;
+
+/// Bytes to a chunk at most; most are closed by time.
+const CHUNK: u64 = 1 << 20;
+/// Records of the bring-up to a chunk.
+const RECORDS: usize = 128;
+/// Pause between two closed chunks: a program that is killed loses no more.
+const CLOSE_EVERY: Duration = Duration::from_millis(500);
+/// Pause between two requests to the system to put it on the disk: a power cut loses little more.
+const SYNC_EVERY: Duration = Duration::from_secs(2);
+
+/// What of a log can be read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(super) struct Whole {
+    /// Messages in closed chunks.
+    pub messages: u64,
+    /// Times of the first and the last message, ns.
+    span: Option<(u64, u64)>,
+    /// Where the last closed chunk ends.
+    bytes: u64,
+}
+
+impl Whole {
+    /// From the first message to the last.
+    pub(super) fn covers(&self) -> Duration {
+        let span = self.span.map(|(first, last)| last.saturating_sub(first));
+        Duration::from_nanos(span.unwrap_or(0))
+    }
+}
+
+/// A file that takes nothing more after its first error: what a library writes when it is dropped stays away.
+struct Sink {
+    file: File,
+    failed: bool,
+}
+
+impl Write for Sink {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.failed {
+            return Err(io::Error::other("it failed before"));
+        }
+        let written = self.file.write(bytes);
+        if let Err(error) = &written {
+            self.failed = error.kind() != io::ErrorKind::Interrupted;
+        }
+        written
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// A log file.
+pub(super) struct LogFile {
+    writer: Writer<NoSeek<Sink>>,
+    /// The same file, to mend its end.
+    file: File,
+    ids: [u16; CHANNELS.len()],
+    sequence: [u32; CHANNELS.len()],
+    clock: Clock,
+    /// What was written, and what of that is closed.
+    written: Whole,
+    whole: Whole,
+    fault: Arc<OnceLock<String>>,
+}
+
+impl LogFile {
+    /// Creates the file; never over one that is there. `fault` is told what ends it.
+    pub(super) fn create(
+        path: &Path,
+        clock: Clock,
+        fault: Arc<OnceLock<String>>,
+    ) -> anyhow::Result<Self> {
+        let file = File::create_new(path)?;
+        let log = Self::start(file, clock, fault);
+        if log.is_err() {
+            // Nothing is in it: it would only be in the way of the next try.
+            let _ = std::fs::remove_file(path);
+        }
+        log
+    }
+
+    fn start(file: File, clock: Clock, fault: Arc<OnceLock<String>>) -> anyhow::Result<Self> {
+        let sink = Sink {
+            file: file.try_clone()?,
+            failed: false,
+        };
+        let mut writer = WriteOptions::new()
+            .compression(None)
+            .chunk_size(Some(CHUNK))
+            // A chunk is put together in memory: what is in the file is whole.
+            .disable_seeking(true)
+            .library(concat!("gauntlet ", env!("CARGO_PKG_VERSION")))
+            .create(NoSeek::new(sink))?;
+        let mut ids = [0; CHANNELS.len()];
+        for (channel, id) in CHANNELS.iter().zip(&mut ids) {
+            let schema = writer.add_schema(
+                channel.schema_name,
+                "jsonschema",
+                (channel.schema)().to_string().as_bytes(),
+            )?;
+            *id = writer.add_channel(schema, channel.topic, "json", &Default::default())?;
+        }
+        writer.flush()?;
+        let mut log = Self {
+            writer,
+            file,
+            ids,
+            sequence: [0; CHANNELS.len()],
+            clock,
+            written: Whole::default(),
+            whole: Whole::default(),
+            fault,
+        };
+        log.close_chunk()?;
+        Ok(log)
+    }
+
+    /// Writes `early`, then what comes, until nothing can come any more or the file takes nothing.
+    pub(super) fn write_all(&mut self, early: Vec<Record>, records: &Receiver<Record>) {
+        let result = self.write_until_end(early, records);
+        self.note(&result);
+    }
+
+    fn write_until_end(
+        &mut self,
+        early: Vec<Record>,
+        records: &Receiver<Record>,
+    ) -> McapResult<()> {
+        for part in early.chunks(RECORDS) {
+            for record in part {
+                self.write(record)?;
+            }
+            self.close_chunk()?;
+        }
+        let mut close = Instant::now() + CLOSE_EVERY;
+        let mut sync = Instant::now() + SYNC_EVERY;
+        loop {
+            match records.recv_timeout(close.saturating_duration_since(Instant::now())) {
+                Ok(record) => self.write(&record)?,
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+            }
+            let now = Instant::now();
+            if now >= close {
+                self.close_chunk()?;
+                close = now + CLOSE_EVERY;
+            }
+            if now >= sync {
+                self.file.sync_data()?;
+                sync = Instant::now() + SYNC_EVERY;
+            }
+        }
+    }
+
+    fn write(&mut self, record: &Record) -> McapResult<()> {
+        for (channel, message) in channels::messages(record) {
+            let text = serde_json::to_vec(&message).map_err(io::Error::from)?;
+            self.write_message(channel, record, &text)?;
+        }
+        Ok(())
+    }
+
+    fn write_message(&mut self, channel: Channel, record: &Record, text: &[u8]) -> McapResult<()> {
+        let index = channel as usize;
+        let at = self.clock.wall_ns(record.at());
+        let header = MessageHeader {
+            channel_id: self.ids[index],
+            sequence: self.sequence[index],
+            log_time: at,
+            publish_time: at,
+        };
+        self.sequence[index] = self.sequence[index].wrapping_add(1);
+        self.writer.write_to_known_channel(&header, text)?;
+        self.written.messages += 1;
+        let (first, last) = self.written.span.unwrap_or((at, at));
+        self.written.span = Some((first.min(at), last.max(at)));
+        Ok(())
+    }
+
+    fn close_chunk(&mut self) -> McapResult<()> {
+        self.writer.flush()?;
+        self.whole = self.written;
+        self.whole.bytes = self.file.stream_position()?;
+        Ok(())
+    }
+
+    /// Writes the index; where the file takes nothing more, lets it end after its last whole chunk.
+    pub(super) fn finish(mut self) -> Whole {
+        if self.fault.get().is_none() {
+            let result = self.close_chunk().and_then(|()| {
+                self.writer.finish()?;
+                Ok(())
+            });
+            self.note(&result);
+        }
+        if self.fault.get().is_some() {
+            // What cannot be mended stays as it is: readers take whole records from the start.
+            let _ = self.end_after_last_chunk();
+        }
+        self.whole
+    }
+
+    fn note(&self, result: &McapResult<()>) {
+        if let Err(error) = result {
+            let _ = self.fault.set(words(error));
+        }
+    }
+
+    fn end_after_last_chunk(&mut self) -> io::Result<()> {
+        self.file.set_len(self.whole.bytes)?;
+        self.file.seek(SeekFrom::Start(self.whole.bytes))?;
+        // The records "data end" and "footer" of a file without a summary.
+        let mut end = vec![0x0f, 4, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0];
+        end.extend([0x02, 20, 0, 0, 0, 0, 0, 0, 0]);
+        end.extend([0; 20]);
+        end.extend(MAGIC);
+        if self.file.write_all(&end).is_err() {
+            // Not even for that is there room.
+            self.file.set_len(self.whole.bytes)?;
+        }
+        Ok(())
+    }
+}
+
+/// The fault in a person's words.
+fn words(error: &mcap::McapError) -> String {
+    let mcap::McapError::Io(error) = error else {
+        return error.to_string();
+    };
+    match error.raw_os_error().map(Errno::from_raw_os_error) {
+        Some(Errno::NOSPC) => "no space left on the disk".to_owned(),
+        Some(Errno::DQUOT) => "no space left: your quota on that disk is used up".to_owned(),
+        Some(Errno::FBIG) => {
+            "the file is as long as the system lets this program make one (`ulimit -f`)".to_owned()
+        }
+        _ => error.to_string(),
+    }
+}

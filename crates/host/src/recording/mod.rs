@@ -1,0 +1,171 @@
+//! The session log: one MCAP file with every frame, command and status of a run, once each.
+//!
+//! Six channels, JSON with a JSON schema each: `/glove/imu`, `/glove/joint_angles`, `/map/output`, `/gripper/command`
+//! (field names rPRA, rSPA, …), `/gripper/status` (gPOA, …), `/events`. `docs/session-log.md` lists the fields. The file
+//! is written by a thread of its own behind a bounded queue, so that a slow disk never slows the loop; what does not fit
+//! is counted and said. Every half second a chunk is closed: whatever ends the program, the file can be read from its
+//! start until then. A disk that takes no more ends the log and nothing else; [`SessionLog::fault`] says so at once, and
+//! the file ends after the last whole chunk.
+
+mod channels;
+mod file;
+
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, OnceLock};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+use anyhow::Result;
+use serde::{Serialize, Serializer};
+
+use crate::clock::Clock;
+use crate::failure::{Failure, OrFail};
+use crate::session::record::Record;
+use file::{LogFile, Whole};
+
+/// Records that may wait for the disk: about 15 s of a run.
+const QUEUE: usize = 4096;
+
+const NEXT_STEP: &str = "another name in a folder with room and permission to write";
+
+/// A log being written.
+#[derive(Debug)]
+pub struct SessionLog {
+    path: PathBuf,
+    sender: Option<SyncSender<Record>>,
+    writer: Option<JoinHandle<Whole>>,
+    fault: Arc<OnceLock<String>>,
+    lost: u64,
+}
+
+/// What a finished log holds.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Written {
+    /// Where it is.
+    pub path: PathBuf,
+    /// Messages in it that can be read.
+    pub messages: u64,
+    /// From the first of them to the last, s.
+    #[serde(rename = "covers_s", serialize_with = "as_seconds")]
+    pub covers: Duration,
+    /// Records that did not fit the queue.
+    pub lost: u64,
+    /// Why it ends before the run does.
+    pub fault: Option<String>,
+}
+
+fn as_seconds<S: Serializer>(time: &Duration, to: S) -> Result<S::Ok, S::Error> {
+    to.serialize_f64(time.as_secs_f64())
+}
+
+impl Written {
+    /// One line for a person.
+    pub fn line(&self) -> String {
+        let (path, messages) = (self.path.display(), self.messages);
+        let lost = match self.lost {
+            0 => String::new(),
+            lost => format!(", {lost} records lost: the disk was too slow"),
+        };
+        match &self.fault {
+            None => format!("{path} with {messages} messages{lost}"),
+            Some(fault) => format!(
+                "{path} is incomplete: {fault}; its first {:.1} s, {messages} messages, are whole{lost}",
+                self.covers.as_secs_f64()
+            ),
+        }
+    }
+
+    /// A failure where the log ends before the run does.
+    ///
+    /// # Errors
+    /// That one.
+    pub fn judge(&self) -> Result<()> {
+        match &self.fault {
+            None => Ok(()),
+            Some(_) => {
+                Err(Failure::new(format!("the session log {}", self.line()), NEXT_STEP).into())
+            }
+        }
+    }
+}
+
+impl SessionLog {
+    /// Creates the file at `path`, never over one that is there, with the records `early` at its start.
+    ///
+    /// # Errors
+    /// A failure that names the path.
+    pub fn create(path: &Path, clock: Clock, early: Vec<Record>) -> Result<Self> {
+        let what = || format!("the session log {} cannot be written", path.display());
+        let fault = Arc::new(OnceLock::new());
+        let mut file = LogFile::create(path, clock, Arc::clone(&fault)).or_fail(what, NEXT_STEP)?;
+        let (sender, receiver) = sync_channel(QUEUE);
+        let writer = std::thread::Builder::new()
+            .name("session log".to_owned())
+            .spawn(move || {
+                file.write_all(early, &receiver);
+                file.finish()
+            })
+            .or_fail(what, "ending other programs")?;
+        Ok(Self {
+            path: path.to_owned(),
+            sender: Some(sender),
+            writer: Some(writer),
+            fault,
+            lost: 0,
+        })
+    }
+
+    /// Takes one record. Never waits: with the queue full it is counted as lost.
+    pub fn take(&mut self, record: Record) {
+        let Some(sender) = &self.sender else { return };
+        // A writer that ended said why.
+        if let Err(TrySendError::Full(_)) = sender.try_send(record) {
+            self.lost += 1;
+        }
+    }
+
+    /// Why nothing is written any more, where that is so.
+    pub fn fault(&self) -> Option<&str> {
+        self.fault.get().map(String::as_str)
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Writes what waits and the index, and closes the file.
+    pub fn finish(mut self) -> Written {
+        let whole = self.join();
+        Written {
+            path: self.path.clone(),
+            messages: whole.messages,
+            covers: whole.covers(),
+            lost: self.lost,
+            fault: self.fault.get().cloned(),
+        }
+    }
+
+    fn join(&mut self) -> Whole {
+        drop(self.sender.take());
+        match self.writer.take().map(JoinHandle::join) {
+            Some(Ok(whole)) => whole,
+            Some(Err(_)) => {
+                let _ = self.fault.set("its writer stopped".to_owned());
+                Whole::default()
+            }
+            None => Whole::default(),
+        }
+    }
+}
+
+impl Drop for SessionLog {
+    /// A run that ends with an error still leaves a whole file.
+    fn drop(&mut self) {
+        self.join();
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,279 @@
+//! Training on hand poses, for the gripper.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Result;
+use glove::hand::{JOINT_NAMES, LIMITS};
+use gripper::space;
+use trainer::algorithm::{PairPlan, Schedule};
+use trainer::cost::Lambda;
+use trainer::data::{Columns, Matrix, Pairs, Table, split};
+use trainer::hand::table3;
+use trainer::hand::{Scripted, Space, start_pairs};
+use trainer::measures::NEIGHBOURS;
+use trainer::model::{Model, Normalisation};
+use trainer::operator::Operator;
+use trainer::spread::spread;
+
+use super::domains::first;
+use super::pairs::{PairChoice, PairKind};
+use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};
+use crate::failure::{Failure, told};
+use crate::interrupt::Interrupt;
+use crate::report::Reporter;
+use crate::session::record::{AXES, AXIS_NAMES};
+use crate::training::motion::{Motion, tell_notes};
+use crate::training::quality::{GRIPPER, Quality, measuring_targets, targets};
+
+/// Pairs where nothing else is said (§3.3.4).
+const PAIRS: usize = 8;
+/// Frames to train and measure on: more of them are neighbours of these (the paper's recording has 635).
+pub const MOST_FRAMES: usize = 1000;
+
+/// A training with adaptive pairs, as the demo does it.
+#[derive(Debug)]
+pub struct Request<'a> {
+    /// The hand's motion.
+    pub motion: &'a Motion,
+    /// How long.
+    pub schedule: Schedule,
+    /// Epochs of the last stage, instead of the schedule's.
+    pub epochs: Option<usize>,
+    /// Reference pairs chosen one after another.
+    pub pairs: usize,
+    /// Whether open hand and fist are there from the start.
+    pub start_pairs: bool,
+    /// Of everything random.
+    pub seed: u64,
+    /// Who hears of it.
+    pub reporter: &'a dyn Reporter,
+}
+
+impl Request<'_> {
+    fn course(&self) -> Course {
+        Course::hae(self.schedule, self.epochs, self.seed)
+    }
+
+    /// All epochs of all stages.
+    pub fn total_epochs(&self) -> usize {
+        let plan = self.course().plan(AXES);
+        plan.stage_epochs * self.pairs + plan.last_epochs
+    }
+}
+
+/// A trained map and what is known about it.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The model.
+    pub model: Model,
+    /// Its measures on the frames that did not train.
+    pub quality: Quality,
+    /// How long it took.
+    pub took: Duration,
+    /// Epochs done.
+    pub epochs: usize,
+    /// Reference pairs used.
+    pub pairs: usize,
+}
+
+/// Trains with adaptive pairs and the usual cost.
+///
+/// # Errors
+/// A failure that says what is wrong with the data, or that the training was stopped.
+pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
+    let wanted = HandPairs {
+        choice: Some(PairChoice {
+            kind: PairKind::Adaptive,
+            count: Some(request.pairs),
+        }),
+        file: None,
+        start_pairs: request.start_pairs,
+        reporter: request.reporter,
+    };
+    let mut task = task(request.motion, &wanted, request.seed, 1.0 - TRAINING_SHARE)?;
+    let course = request.course();
+    let learned = match learn(&mut task, &course, request.reporter, interrupt)? {
+        Ended::Trained(learned) => learned,
+        Ended::StoppedAt(epoch) => {
+            let what = format!("in the training, at epoch {epoch}: no model was made");
+            return Err(Failure::interrupted(&what).into());
+        }
+    };
+    let mut model = task.model(&course, &learned);
+    let measured = task.measure(&mut model, interrupt)?;
+    Ok(Outcome {
+        quality: Quality::from_measured(&measured),
+        model,
+        took: learned.took,
+        epochs: learned.trained.epochs,
+        pairs: learned.trained.pairs.inputs.rows,
+    })
+}
+
+/// Which reference pairs.
+#[derive(Debug, Clone, Copy)]
+pub struct HandPairs<'a> {
+    /// What the person asked for.
+    pub choice: Option<PairChoice>,
+    /// A file of them.
+    pub file: Option<&'a Path>,
+    /// Whether open hand and fist are there from the start.
+    pub start_pairs: bool,
+    /// Who hears what was taken otherwise than it stands.
+    pub reporter: &'a dyn Reporter,
+}
+
+/// The task of mapping a hand's motion to the gripper.
+///
+/// # Errors
+/// A failure that names the file and what is wrong with it.
+pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -> Result<Task> {
+    let inputs = motion.frames();
+    let frames = inputs.select(&spread(&inputs, MOST_FRAMES));
+    if frames.rows < inputs.rows {
+        wanted.reporter.note(&format!(
+            "note: of {} frames the {} that are farthest from one another are taken: the others are near to them",
+            inputs.rows,
+            frames.rows
+        ));
+    }
+    let parts = split(frames.rows, 1.0 - hold_out, seed);
+    let training = frames.select(&parts.train);
+    let enough = parts.test.len() > NEIGHBOURS;
+    let held_out = if enough {
+        frames.select(&parts.test)
+    } else {
+        training.clone()
+    };
+    let source = match motion {
+        Motion::Generated { .. } => "generated motion".to_owned(),
+        Motion::Recorded { name, .. } => name.clone(),
+    };
+    let share = if enough {
+        "held-out frames"
+    } else {
+        "the training frames"
+    };
+    let mut operator = operator(motion, &training)?;
+    let (pairs, pairs_from) = pairs(wanted, &mut operator)?;
+    let units = Units {
+        q: Normalisation::identity(inputs.cols),
+        x: Normalisation::gripper(AXES),
+    };
+    Ok(Task {
+        training,
+        held_out,
+        targets: targets(seed),
+        measuring: measuring_targets(seed),
+        truth: None,
+        coverage: GRIPPER,
+        is_hand: true,
+        answers: None,
+        inputs,
+        units,
+        pairs,
+        operator: Box::new(operator),
+        lambda: Lambda::HAND,
+        names: &JOINT_NAMES,
+        pairs_from,
+        measured_on: format!("{share} of {source}"),
+    })
+}
+
+/// Who answers for the person.
+fn operator(motion: &Motion, training: &Matrix) -> Result<Scripted> {
+    match motion {
+        Motion::Generated { .. } => Ok(Scripted::new(Space::ThreeFinger, &LIMITS)),
+        Motion::Recorded { .. } => {
+            Scripted::for_recording(Space::ThreeFinger, training).map_err(told)
+        }
+    }
+}
+
+/// The pairs, and in words where they come from.
+fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPlan, String)> {
+    let count = |choice: Option<PairChoice>| choice.and_then(|c| c.count).unwrap_or(PAIRS);
+    let kind = match (wanted.choice, wanted.file) {
+        (Some(choice), _) => choice.kind,
+        (None, Some(_)) => PairKind::Fixed,
+        (None, None) => PairKind::Adaptive,
+    };
+    match kind {
+        PairKind::Fixed => {
+            let Some(file) = wanted.file else {
+                let what = "--pairs fixed takes those of a file";
+                return Err(Failure::usage(what, "--pairs-file PAIRS.csv").into());
+            };
+            let count = wanted.choice.and_then(|choice| choice.count);
+            let text = format!("of {}, all there from the start", file.display());
+            Ok((
+                PairPlan::Fixed(first(from_file(file, wanted.reporter)?, count)?),
+                text,
+            ))
+        }
+        PairKind::Adaptive => {
+            let start = match wanted.file {
+                Some(file) => from_file(file, wanted.reporter)?,
+                None if wanted.start_pairs => {
+                    start_pairs(Space::ThreeFinger, operator).map_err(told)?
+                }
+                None => Pairs::default(),
+            };
+            let plan = PairPlan::Adaptive {
+                start,
+                count: count(wanted.choice),
+            };
+            Ok((
+                plan,
+                "the scripted operator shows the hand poses".to_owned(),
+            ))
+        }
+        PairKind::Table3 if wanted.file.is_some() => Err(Failure::usage(
+            "--pairs table3 brings its own poses, --pairs-file others",
+            "one of the two",
+        )
+        .into()),
+        PairKind::Table3 => {
+            let fixed = table3::pairs(operator, count(wanted.choice)).map_err(told)?;
+            let text = "of Table 3, the scripted operator shows the hand poses".to_owned();
+            Ok((PairPlan::Fixed(fixed), text))
+        }
+        PairKind::Random => Err(Failure::usage(
+            "--pairs random chooses among true pairs, and a hand has none",
+            "--pairs 8, --pairs table3 or --pairs-file",
+        )
+        .into()),
+        PairKind::Boundary => Err(Failure::usage(
+            "--pairs boundary takes matched points of two outlines, and a hand has none",
+            "--pairs 8, --pairs table3 or --pairs-file",
+        )
+        .into()),
+    }
+}
+
+/// The pairs of a file, radians and counts, targets the gripper can take.
+fn from_file(file: &Path, reporter: &dyn Reporter) -> Result<Pairs> {
+    let columns: Vec<&str> = JOINT_NAMES.iter().chain(&AXIS_NAMES).copied().collect();
+    let mut table = Table::open(file, Columns::Named(&columns)).map_err(told)?;
+    let pairs = (table.hand_pairs(&JOINT_NAMES, &AXIS_NAMES)).map_err(told)?;
+    tell_notes(file, &table, reporter);
+    for (row, target) in pairs.targets.iter_rows().enumerate() {
+        let Ok(counts) = <[f32; AXES]>::try_from(target) else {
+            continue;
+        };
+        if !space::contains(&counts) {
+            let what = format!(
+                "{}: pair {}: {counts:?} is no position of the gripper (0 to 255 an axis; where the scissor is above {} \
+                 finger A with B or C below {})",
+                file.display(),
+                row + 1,
+                space::SCISSOR_LIMIT,
+                space::SUM_LIMIT
+            );
+            let next = format!("{:?}, the nearest one", space::nearest(&counts));
+            return Err(Failure::new(what, next).into());
+        }
+    }
+    Ok(pairs)
+}

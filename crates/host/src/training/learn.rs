@@ -1,0 +1,137 @@
+//! A training with pauses: to keep its state, to stop where it was to stop, or because a person asked.
+
+use std::ops::ControlFlow;
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use trainer::algorithm::{InUnits, Trainer};
+
+use super::told::Told;
+use super::{Course, Ended, Learned, Task};
+use crate::failure::{Failure, told};
+use crate::interrupt::Interrupt;
+use crate::report::Reporter;
+
+/// A state is kept so often.
+const KEEP_EVERY: Duration = Duration::from_secs(60);
+/// Epochs between two looks at the clock: often enough for a smooth bar and a prompt Ctrl-C.
+const LOOK_EVERY: usize = 10;
+
+/// Trains to the end, or to where it is to stop.
+///
+/// # Errors
+/// A failure that says what is wrong with the data, or that the training was broken off and where its state is kept.
+pub fn learn(
+    task: &mut Task,
+    course: &Course,
+    reporter: &dyn Reporter,
+    interrupt: &Interrupt,
+) -> Result<Ended> {
+    let settings = course.settings(task);
+    let (q, x) = (
+        task.units.q.apply_all(&task.training),
+        task.units.x.apply_all(&task.targets),
+    );
+    let mut trainer = Trainer::new(&q, &x, &settings).map_err(told)?;
+    if let Some(path) = &course.resume {
+        trainer
+            .load_checkpoint(path)
+            .map_err(|error| named(path, &error))?;
+    }
+    let units = task.units.clone();
+    let mut operator = InUnits {
+        operator: task.operator.as_mut(),
+        input: &units.q,
+        target: &units.x,
+    };
+    let total = trainer.total();
+    let mut told_so_far = Told {
+        progress: reporter.begin("training", total as u64),
+        warnings: Vec::new(),
+        names: task.names,
+    };
+    let mut pause = Pause::Interrupt;
+    let started = Instant::now();
+    let mut kept = started;
+    let each = if course.stop_at.is_some() {
+        1
+    } else {
+        LOOK_EVERY
+    };
+    let trained = trainer.train_with(&mut operator, each, &mut |trainer| {
+        for warning in trainer.take_warnings() {
+            told_so_far.tell(&warning, &trainer.progress());
+        }
+        told_so_far.show(&trainer.progress());
+        if interrupt.asked() {
+            pause = Pause::Interrupt;
+            return ControlFlow::Break(());
+        }
+        if course.stop_at.is_some_and(|epoch| trainer.epoch() >= epoch) {
+            pause = Pause::StopAt;
+            return ControlFlow::Break(());
+        }
+        if let Some(path) = course.checkpoint.as_ref().filter(|_| kept.elapsed() >= KEEP_EVERY) {
+            kept = Instant::now();
+            if let Err(error) = trainer.save_checkpoint(path) {
+                // The training is worth more than its copy.
+                told_so_far.warn(format!(
+                    "{error} (epoch {}): the training goes on, and is tried to be kept again in a minute",
+                    trainer.epoch()
+                ));
+            }
+        }
+        ControlFlow::Continue(())
+    });
+    if let Some(trained) = trained.map_err(told)? {
+        return Ok(Ended::Trained(Box::new(Learned {
+            trained,
+            took: started.elapsed(),
+            warnings: told_so_far.warnings,
+        })));
+    }
+    if let Some(path) = &course.checkpoint {
+        trainer.save_checkpoint(path).map_err(told)?;
+    }
+    match pause {
+        Pause::StopAt => Ok(Ended::StoppedAt(trainer.epoch())),
+        Pause::Interrupt => Err(broken_off(course, trainer.epoch())),
+    }
+}
+
+/// Why a training ends before its end.
+#[derive(Debug, Clone, Copy)]
+enum Pause {
+    /// It is where it was to stop.
+    StopAt,
+    /// A person asked.
+    Interrupt,
+}
+
+fn named(path: &Path, error: &trainer::algorithm::checkpoint::Error) -> anyhow::Error {
+    let text = error.to_string();
+    let name = path.display().to_string();
+    if text.contains(&name) {
+        told(text)
+    } else {
+        told(format!("{name}: {text}"))
+    }
+}
+
+fn broken_off(course: &Course, epoch: usize) -> anyhow::Error {
+    match &course.checkpoint {
+        Some(path) => Failure::new(
+            format!(
+                "interrupted in the training, at epoch {epoch}: no model was made, the state is in {}",
+                path.display()
+            ),
+            format!("the same again with --resume {}", path.display()),
+        )
+        .into(),
+        None => Failure::interrupted(&format!(
+            "in the training, at epoch {epoch}: no model was made"
+        ))
+        .into(),
+    }
+}

@@ -1,0 +1,66 @@
+//! What a person hears of a training: progress, and warnings once each.
+
+use trainer::algorithm::{Progress as Step, Warning};
+
+use crate::report::Progress;
+
+/// What a person is told while it trains.
+pub(super) struct Told {
+    pub progress: Box<dyn Progress>,
+    pub warnings: Vec<String>,
+    /// Of the input's columns.
+    pub names: &'static [&'static str],
+}
+
+impl Told {
+    /// A warning of the training.
+    pub fn tell(&mut self, warning: &Warning, step: &Step<'_>) {
+        let text = self.words(warning, step);
+        self.warn(text);
+    }
+
+    pub fn show(&mut self, step: &Step<'_>) {
+        let is_spreading = step.weights.attraction > 0.0;
+        self.progress
+            .at(step.epoch as u64, Some(step.remaining), &|| {
+                format!(
+                    "epoch {} of {}, {} pairs, cost {:.4}{}",
+                    step.epoch,
+                    step.total,
+                    step.pairs.inputs.rows,
+                    step.cost,
+                    if is_spreading { ", spreading" } else { "" }
+                )
+            });
+    }
+
+    /// A warning, once: a training that pauses looks at its end again.
+    pub fn warn(&mut self, text: String) {
+        if !self.warnings.contains(&text) {
+            self.progress.note(&format!("warning: {text}"));
+            self.warnings.push(text);
+        }
+    }
+
+    /// A warning of the map with its epoch, one of the data with the column's name.
+    fn words(&self, warning: &Warning, step: &Step<'_>) -> String {
+        match warning {
+            Warning::Fold { .. } | Warning::Uncovered { .. } => {
+                format!("{warning} (epoch {} of {})", step.epoch, step.total)
+            }
+            Warning::ConstantColumn {
+                what: "input",
+                column,
+                value,
+            } => match self.names.get(column.wrapping_sub(1)) {
+                Some(name) => {
+                    format!(
+                        "{name} is {value} in every frame that trains: the map cannot depend on it"
+                    )
+                }
+                None => warning.to_string(),
+            },
+            of_data => of_data.to_string(),
+        }
+    }
+}

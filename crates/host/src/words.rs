@@ -1,0 +1,128 @@
+//! Codes of the devices in a person's words.
+
+use glove::hand;
+use glove::scan::Health;
+use gripper::{Activation, Contact, Status};
+
+use gripper::space::AXES;
+/// The gripper's axes as a person reads them; files have [`crate::session::record::AXIS_NAMES`].
+pub const AXIS_WORDS: [&str; AXES] = ["finger A", "finger B", "finger C", "scissor"];
+
+/// The fingers, thumb first: each has five joint angles in a row.
+pub const FINGER_NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
+
+/// gFLT of a status.
+pub fn fault_code(status: &Status<AXES>) -> u8 {
+    status.fault.code()
+}
+
+/// gIMC: 0 reset, 1 activating, 2 changing mode, 3 ready.
+pub fn activation_code(activation: Activation) -> u8 {
+    match activation {
+        Activation::Reset => 0,
+        Activation::Activating => 1,
+        Activation::ChangingMode => 2,
+        Activation::Ready => 3,
+    }
+}
+
+/// gDTx.
+pub fn contact_code(contact: Contact) -> u8 {
+    match contact {
+        Contact::Moving => 0,
+        Contact::ContactOpening => 1,
+        Contact::ContactClosing => 2,
+        Contact::AtPosition => 3,
+    }
+}
+
+/// What an axis does.
+pub fn contact(contact: Contact) -> &'static str {
+    match contact {
+        Contact::Moving => "moving",
+        Contact::ContactOpening => "stopped while opening",
+        Contact::ContactClosing => "holds something",
+        Contact::AtPosition => "there",
+    }
+}
+
+/// How ready a gripper is.
+pub fn activation(activation: Activation) -> &'static str {
+    match activation {
+        Activation::Reset => "not activated",
+        Activation::Activating => "activating",
+        Activation::ChangingMode => "changing its mode",
+        Activation::Ready => "ready",
+    }
+}
+
+/// For each finger, whether all its five angles rest on good sensors. `good`: by segment.
+pub fn fingers_good(good: &[bool; hand::SEGMENT_COUNT]) -> [bool; 5] {
+    let lost = good
+        .iter()
+        .enumerate()
+        .filter(|(_, good)| !**good)
+        .fold(0_u32, |mask, (segment, _)| {
+            mask | hand::joints_of_segment(segment)
+        });
+    core::array::from_fn(|finger| lost >> (5 * finger) & 0b1_1111 == 0)
+}
+
+/// The sensors that are not good, by name.
+pub fn lost_sensors(health: &[Health; hand::SEGMENT_COUNT]) -> Option<String> {
+    let lost: Vec<String> = hand::SEGMENT_NAMES
+        .iter()
+        .zip(health)
+        .filter(|(_, health)| **health != Health::Good)
+        .map(|(name, health)| format!("{name} ({health})"))
+        .collect();
+    match lost.len() {
+        0 => None,
+        1..=3 => Some(format!("sensor {}", lost.join(", "))),
+        count => Some(format!("{count} of 16 sensors, {} first", lost[0])),
+    }
+}
+
+/// The sensors that are not used although they give orientations, by name. `distrusted`: bit k is segment k.
+pub fn distrusted_sensors(distrusted: u16) -> Option<String> {
+    let names: Vec<&str> = hand::SEGMENT_NAMES
+        .iter()
+        .enumerate()
+        .filter(|(segment, _)| distrusted >> segment & 1 == 1)
+        .map(|(_, name)| *name)
+        .collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "sensor {} jumped or restarted: its joints are held until the next calibration",
+            names.join(", ")
+        )
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lost_sensor_marks_its_own_finger_and_the_back_of_the_hand_all() {
+        let mut good = [true; hand::SEGMENT_COUNT];
+        good[4] = false; // index_proximal
+        assert_eq!(fingers_good(&good), [true, false, true, true, true]);
+        good[4] = true;
+        good[0] = false;
+        assert_eq!(fingers_good(&good), [false; 5]);
+    }
+
+    #[test]
+    fn one_lost_sensor_is_named_and_many_are_counted() {
+        let mut health = [Health::Good; hand::SEGMENT_COUNT];
+        assert_eq!(lost_sensors(&health), None);
+        health[11] = Health::Starting;
+        assert_eq!(
+            lost_sensors(&health).as_deref(),
+            Some("sensor ring_middle (starting)")
+        );
+        health = [Health::Starting; hand::SEGMENT_COUNT];
+        assert!(lost_sensors(&health).unwrap().starts_with("16 of 16"));
+    }
+}
