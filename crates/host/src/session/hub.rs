@@ -203,3 +203,31 @@ impl Hub {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bridge::calibration::Try;
+
+    #[test]
+    fn each_watcher_hears_every_event_once_and_of_a_flood_the_newest() {
+        let hub = Hub::default();
+        let say = |count: usize| {
+            for number in 0..count {
+                hub.lock().happened(Happened {
+                    sort: Sort::Note,
+                    text: number.to_string(),
+                    kind: Kind::Calibration(Try::Taken),
+                });
+            }
+        };
+        let (mut first, mut second) = (0, 0);
+        say(3);
+        assert_eq!(hub.happened(&mut first).len(), 3);
+        assert_eq!(hub.happened(&mut first).len(), 0);
+        say(EVENTS + 5);
+        let heard = hub.happened(&mut first);
+        assert_eq!((heard.len(), heard[0].text.as_str()), (EVENTS, "5"));
+        assert_eq!(hub.clone().happened(&mut second), heard);
+    }
+}

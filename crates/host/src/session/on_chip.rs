@@ -5,7 +5,6 @@
 
 use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 use anyhow::Result;
 use bridge::protocol::message::Sample;
@@ -23,8 +22,6 @@ use crate::realtime::Scheduling;
 
 /// Pause between two telemetry samples, ms.
 pub const SAMPLE_MS: u16 = 50;
-/// Pause between two looks whether it has ended.
-const LOOK: Duration = Duration::from_millis(5);
 
 /// What a conversation leaves.
 #[derive(Debug)]
@@ -76,7 +73,7 @@ impl OnChip {
         })
     }
 
-    /// Waits for the thread's end, which is near.
+    /// Waits for the thread's end, which is near: every request of its has a deadline.
     fn join(&mut self) -> Option<Error> {
         let thread = self.thread.take()?;
         let left = thread.join().unwrap_or(Left {
@@ -119,9 +116,6 @@ impl Session for OnChip {
 
     fn stop(&mut self) -> Result<Stopped> {
         self.orders.give(Order::Stop);
-        while self.running() {
-            std::thread::sleep(LOOK);
-        }
         let fault = self.join();
         match (self.left, fault) {
             (Some(Stopped::Untouched) | None, Some(fault)) => Err(Failure::from(fault).into()),

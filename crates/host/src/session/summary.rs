@@ -216,3 +216,40 @@ impl Summary {
             || self.worst_late_us >= VERY_LATE_US
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::{Value, to_value};
+
+    #[test]
+    fn both_homes_name_the_same_things_alike_and_leave_out_what_they_cannot_tell() {
+        let here = Summary::default().with(&Counters::default(), Scheduling::Shared);
+        let time = Duration::from_secs(1);
+        let chip = Summary::default().on_chip(&message::Counters::default(), time);
+        let [here, chip] = [here, chip].map(|summary| to_value(summary).unwrap());
+        let names = |summary: &Value| -> Vec<String> {
+            let object = summary.as_object().unwrap();
+            object.keys().cloned().collect()
+        };
+        assert_eq!(names(&here), names(&chip));
+        for name in ["bytes_lost", "samples"] {
+            assert!(here[name].is_null() && !chip[name].is_null(), "{name}");
+        }
+        for name in ["stalls", "scheduling", "gripper_failed"] {
+            assert!(chip[name].is_null() && !here[name].is_null(), "{name}");
+        }
+    }
+
+    #[test]
+    fn the_rates_of_a_chip_are_over_the_time_it_counted() {
+        let grown = message::Counters {
+            frames: 50,
+            statuses: 200,
+            ..Default::default()
+        };
+        let summary = Summary::default().on_chip(&grown, Duration::from_secs(2));
+        assert_eq!(summary.glove_frames_per_s, 25.0);
+        assert_eq!(summary.gripper_cycles_per_s, 100.0);
+    }
+}
