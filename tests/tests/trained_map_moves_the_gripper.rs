@@ -112,6 +112,7 @@ impl Bench {
 fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
     let outcome = train(
         &Request {
+            space: trainer::hand::Space::ThreeFinger,
             motion: &Motion::Generated { seed: SEED },
             schedule: Schedule::Fast,
             epochs: None,

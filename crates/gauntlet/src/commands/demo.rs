@@ -9,6 +9,7 @@ use rig::gripper::VirtualGripper;
 use rig::pty::{Handle, PtyDevice};
 use serde_json::json;
 use trainer::algorithm::Schedule;
+use trainer::hand::Space;
 
 use super::{on_chip, teleop};
 use crate::cli::Demo;
@@ -27,7 +28,7 @@ use host::session::{Parts, Session};
 use host::stats::seconds;
 use host::training::model;
 use host::training::motion::Motion;
-use host::training::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
+use host::training::quality::Quality;
 use host::training::{Outcome, Request, train};
 
 /// Reference pairs chosen one after another.
@@ -87,6 +88,7 @@ pub(super) fn trained(
 ) -> Result<Outcome> {
     let request = Request {
         motion,
+        space: Space::ThreeFinger,
         schedule: Schedule::Fast,
         epochs: None,
         pairs: PAIRS,
@@ -111,17 +113,11 @@ pub(super) fn trained(
 
 /// The demo does not drive with a map that leaves out much of the gripper's range, or folds.
 fn require_good(quality: &Quality) -> Result<()> {
-    if quality.good() {
+    let Some(fault) = quality.fault() else {
         return Ok(());
-    }
-    Err(Failure::new(
-        format!(
-            "the map is not good enough to drive with: volume occupancy {:.3} (at least {LEAST_OCCUPANCY}), d-Knn {:.2} (at most {GREATEST_D_KNN})",
-            quality.volume_occupancy, quality.d_knn
-        ),
-        "another --seed, or a recording in which every finger moves over its whole range, alone and together",
-    )
-    .into())
+    };
+    let next = "another --seed, or a recording in which every finger moves over its whole range, alone and together";
+    Err(Failure::new(fault, next).into())
 }
 
 /// Starts both devices and opens the ports to them.
@@ -254,6 +250,7 @@ mod tests {
             d_knn,
             frames: 254,
             measured_on: "held-out frames".to_owned(),
+            bar: host::training::quality::Bar::of(Space::ThreeFinger),
         }
     }
 
