@@ -85,7 +85,7 @@ fn words() -> String {
 }
 
 /// Whether `required` names `need`; the word in it that names nothing.
-fn is_required<'a>(required: &'a str, need: Need) -> Result<bool, &'a str> {
+fn is_required(required: &str, need: Need) -> Result<bool, &str> {
     let mut named = false;
     for word in required.split(',').map(str::trim).filter(|w| !w.is_empty()) {
         match Need::ALL.iter().find(|need| need.word() == word) {
