@@ -227,7 +227,7 @@ fn next_step(left: &[Thing], leave: Leave) -> &'static str {
 
 /// A thing and the lines that install it.
 fn told(thing: Thing) -> String {
-    let ways: Vec<String> = thing.ways().iter().map(|way| typed(way)).collect();
+    let ways: Vec<String> = thing.ways().iter().map(typed).collect();
     format!("  {}: {}", thing.name(), ways.join(", or "))
 }
 

@@ -31,7 +31,7 @@ fn images_of_any_bytes_are_judged_alike_and_a_sound_one_gives_finite_numbers() {
             let at = if rng.next_u64() & 1 == 0 { at % 48 } else { at };
             image[at] = rng.next_u64() as u8;
         }
-        if rng.next_u64() % 8 == 0 {
+        if rng.next_u64().is_multiple_of(8) {
             image.truncate(rng.next_u64() as usize % image.len());
         }
         sound += u32::from(fuzz::image(&image));
