@@ -64,12 +64,7 @@ fn hex(text: &str) -> Vec<u8> {
 
 /// The golden frames' TCP lines: tag, direction, bytes; `None` where the shared data are absent.
 fn golden() -> Option<Vec<(String, String, Vec<u8>)>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/robotiq/golden_frames.txt");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is absent", path.display());
-        return None;
-    };
+    let text = rig::skip::shared("robotiq/golden_frames.txt")?;
     let lines = text.lines().filter(|line| line.starts_with("TCP"));
     let parse = |line: &str| {
         let (head, _) = line.split_once(';')?;
