@@ -63,7 +63,11 @@ fn ends(fault: &str) -> Output {
 #[test]
 fn a_stack_that_overflows_is_told_and_ends_the_program() {
     let output = ends("stack");
-    assert_eq!(output.status.signal(), Some(rustix::process::Signal::ABORT.as_raw()), "{output:?}");
+    assert_eq!(
+        output.status.signal(),
+        Some(rustix::process::Signal::ABORT.as_raw()),
+        "{output:?}"
+    );
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(said.contains("overflowed its stack"), "{said}");
 }
@@ -72,5 +76,9 @@ fn a_stack_that_overflows_is_told_and_ends_the_program() {
 #[test]
 fn an_instruction_that_is_none_ends_the_program() {
     let output = ends("instruction");
-    assert_eq!(output.status.signal(), Some(rustix::process::Signal::ILL.as_raw()), "{output:?}");
+    assert_eq!(
+        output.status.signal(),
+        Some(rustix::process::Signal::ILL.as_raw()),
+        "{output:?}"
+    );
 }

@@ -1,28 +1,24 @@
 //! What one step does, piece by piece.
 
-use super::App;
+use super::{App, GripperError};
+use crate::board::Board;
 use crate::event::{Event, Kind};
-use crate::platform::{Platform, Slot};
 use crate::posture;
 use crate::supervisor::{Hand, Inputs, Output, State, Weights};
 use crate::telemetry::{Sent, bump};
 use crate::{Duration, HIDDEN, HoldReason, Instant, timing};
-use embedded_io::{Read, ReadReady, Write};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::imu;
 use glove::scan::{Finding, Frame, Health};
 use gripper::registers::Fault;
 use gripper::{Gripper, Status};
 
-impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
+impl<B: Board<X>, const X: usize> App<B, X> {
     /// Polls the gripper and sees whether a command left.
-    pub(super) fn poll_and_see(&mut self, now: Instant) -> Option<Result<Status<X>, R::Error>> {
+    pub(super) fn poll_and_see(
+        &mut self,
+        now: Instant,
+    ) -> Option<Result<Status<X>, GripperError<B, X>>> {
         let before = self.gripper.counters().writes;
         let result = self.gripper.poll(now);
         let sent = self.gripper.counters().writes != before;
