@@ -8,8 +8,7 @@
 //! counts elapsed time, so the additional steps change no limit. The grid does not move with them.
 //!
 //! **What `latency` measures.** From the stamp of the oldest sample used (when its request was sent) to the moment the
-//! driver handed the request that carries the command to its port: seen by the link's count of writing requests going up
-//! in a poll while the command is set. The 29 bytes of the request then take 2.5 ms at 115200 baud.
+//! driver handed the request that carries the command to its port ([`gripper::Event::Sent`]). The 29 bytes of the request then take 2.5 ms at 115200 baud.
 
 mod calibrating;
 mod tick;
@@ -40,6 +39,9 @@ pub const fn expected(axes: usize) -> Expected {
 /// What a board's gripper says where a cycle fails.
 pub type GripperError<B, const X: usize> = <<B as Board<X>>::Gripper as Gripper<X>>::Error;
 
+/// How a cycle of a board's gripper ended.
+type CycleEnd<B, const X: usize> = Result<Status<X>, GripperError<B, X>>;
+
 /// The bridge: `B` its home, `X` the gripper's number of axes.
 pub struct App<B: Board<X>, const X: usize> {
     board: B,
@@ -56,7 +58,8 @@ pub struct App<B: Board<X>, const X: usize> {
     due: Option<Instant>,
     /// What the driver was told last; `at` is when it was decided until it leaves.
     order: Option<Sent<X>>,
-    stashed: Option<Result<Status<X>, GripperError<B, X>>>,
+    /// Found in a step's second poll, for the next step.
+    stashed: Option<CycleEnd<B, X>>,
     gripper_error: Option<GripperError<B, X>>,
     sensors: Sensors,
     calibrating: Calibrating,
@@ -145,7 +148,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             // as it is now: where the machine stood still in this very step, the command is too old to leave.
             if self.gripper.next_due() <= now {
                 let now = self.board.now();
-                self.stashed = self.poll_and_see(now);
+                self.stashed = self.poll_for_end(now);
             }
         }
         self.telemetry.now = now;
