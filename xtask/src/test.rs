@@ -43,7 +43,8 @@ impl Options {
 }
 
 /// Packages with a lock file of their own, outside the workspace.
-const OUTSIDE: [&str; 4] = [
+const OUTSIDE: [&str; 5] = [
+    "firmware",
     "firmware-sim",
     "crates/hae/qemu-count",
     "benches/map",

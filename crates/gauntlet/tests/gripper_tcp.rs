@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use gripper::driver::ThreeFinger;
 use gripper::registers::{COMMAND, STATUS, three_finger};
-use gripper::{Activation, Gripper, Motion, Status};
+use gripper::{Activation, Event, Gripper, Motion, Status};
 use host::clock::Clock;
 use host::interrupt::Interrupt;
 use host::lines::tcp::{Address, Error, Port, UNIT};
@@ -47,7 +47,7 @@ fn until(
     loop {
         let now = clock.now();
         driver.set_motion(motion, now);
-        let heard = driver.poll(now);
+        let heard = driver.poll(now).and_then(Event::ended);
         if done(driver, heard) {
             return;
         }

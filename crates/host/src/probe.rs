@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::ThreeFinger;
-use gripper::{Gripper, Status};
+use gripper::{Event, Gripper, Status};
 
 use crate::clock::Clock;
 use crate::diagnose;
@@ -147,12 +147,12 @@ pub fn open_gripper_with(
     let mut other = None;
     while Instant::now() < end && other.is_none() && !interrupt.sleep(LOOK) {
         match driver.poll(clock.now()) {
-            Some(Ok(status)) => {
+            Some(Event::Status(status)) => {
                 drop(driver);
                 return Ok((port, status));
             }
-            Some(Err(gripper::Error::OtherGripper(kind))) => other = Some(kind),
-            Some(Err(_)) | None => {}
+            Some(Event::Failed(gripper::Error::OtherGripper(kind))) => other = Some(kind),
+            Some(Event::Failed(_) | Event::Sent) | None => {}
         }
     }
     drop(driver);

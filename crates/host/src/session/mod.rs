@@ -33,8 +33,14 @@ mod worker;
 
 use worker::{Seen, Worker};
 
+impl bridge::Board<AXES> for Pc {
+    type Glove = Port;
+    type Gripper = ThreeFinger<Line>;
+    type Flash = MemorySlot;
+}
+
 /// The bridge as a PC runs it.
-pub type PcApp = App<Pc, Port, ThreeFinger<Line>, MemorySlot, AXES>;
+pub type PcApp = App<Pc, AXES>;
 
 /// Orders that may wait; the loop takes them every 10 ms.
 const ORDERS: usize = 64;
