@@ -8,9 +8,10 @@
 use bridge::gripper::Gripper;
 use bridge::gripper::driver::{Config as GripperConfig, ThreeFinger};
 use bridge::protocol::{Outcome, Server};
-use bridge::{App, Config, Instant, Platform, Slot, WeightsStore, glove};
+use bridge::{App, Board, Config, Instant, Platform, Slot, WeightsStore, glove};
 use core::cell::{Cell, RefCell};
 use core::convert::Infallible;
+use core::marker::PhantomData;
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 
 /// The host protocol's line.
@@ -172,6 +173,28 @@ impl Platform for Machine<'_, '_> {
     }
 }
 
+/// The machine as a board with flash `F` and a gripper of the caller's making.
+pub struct Home<'s, 't, F, R> {
+    machine: Machine<'s, 't>,
+    devices: PhantomData<(F, R)>,
+}
+
+impl<F, R> Platform for Home<'_, '_, F, R> {
+    fn now(&mut self) -> Instant {
+        self.machine.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        self.machine.wait_until(due);
+    }
+}
+
+impl<'s, 't, F: Slot, R: Gripper<AXES>> Board<AXES> for Home<'s, 't, F, R> {
+    type Glove = Port<'s, 't>;
+    type Gripper = R;
+    type Flash = F;
+}
+
 /// One line: gives the trace's bytes when their time has come, and puts out what is written.
 pub struct Port<'s, 't> {
     tape: &'s Tape<'t>,
@@ -244,7 +267,7 @@ impl Write for Port<'_, '_> {
 }
 
 /// The bridge on a tape, with a gripper of the caller's making.
-pub type Bridge<'s, 't, F, R> = App<Machine<'s, 't>, Port<'s, 't>, R, F, AXES>;
+pub type Bridge<'s, 't, F, R> = App<Home<'s, 't, F, R>, AXES>;
 
 /// The loop and the host's server.
 pub struct Replay<'s, 't, F: Slot, R: Gripper<AXES>> {
@@ -268,9 +291,12 @@ impl<'s, 't, F: Slot, R: Gripper<AXES>> Replay<'s, 't, F, R> {
             Port::new(tape, GRIPPER),
             GripperConfig::default(),
         ));
-        let machine = Machine::new(tape);
+        let home = Home {
+            machine: Machine::new(tape),
+            devices: PhantomData,
+        };
         Self {
-            app: App::new(machine, scanner, gripper, store, Config::default()),
+            app: App::new(home, scanner, gripper, store, Config::default()),
             server: Server::new(Port::new(tape, HOST)),
             tape,
             frame: 0,

@@ -80,13 +80,7 @@ pub fn inputs(seed: u64, count: usize) -> (Vec<Pose>, Mix) {
 
 /// The poses of the recorded hand beside the checkout; none, with a word, when it is not there.
 pub fn recorded_hand() -> Vec<Pose> {
-    let path =
-        Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/hand/recorded_hand_30hz.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!(
-            "skipped: the recorded hand ({} is not there)",
-            path.display()
-        );
+    let Some(text) = rig::skip::shared("hand/recorded_hand_30hz.csv") else {
         return Vec::new();
     };
     let pose = |line: &str| -> Option<Pose> {

@@ -7,6 +7,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use host::chip::emulator::{FIRMWARE, QEMU, qemu_is_there};
+use rig::skip::{Need, skipped};
 
 /// Order: the map's bits. First input an image, second the inputs of 25 f32 each.
 pub const BITS: u32 = 1;
@@ -23,25 +24,28 @@ const ALIGNMENT: u64 = 64;
 const PATIENCE: Duration = Duration::from_secs(600);
 
 /// The firmware's ELF file, where the environment names it and QEMU is there; else says why not.
+#[track_caller]
 pub fn firmware() -> Option<PathBuf> {
     let Some(path) = std::env::var_os(FIRMWARE).map(PathBuf::from) else {
-        println!("skipped: {FIRMWARE} names no firmware (`cargo xtask test` builds it)");
+        let why = format!("{FIRMWARE} names no firmware (`cargo xtask test` builds it)");
+        skipped(Need::Chip, &why);
         return None;
     };
     if !qemu_is_there() {
-        println!("skipped: {QEMU} is not installed");
+        skipped(Need::Chip, &format!("{QEMU} is not installed"));
         return None;
     }
     Some(path)
 }
 
 /// The image `bench`, which is built beside the firmware; `None`, with a word, as [`firmware`].
+#[track_caller]
 pub fn bench() -> Option<PathBuf> {
     let path = firmware()?.with_file_name("bench");
     if path.is_file() {
         Some(path)
     } else {
-        println!("skipped: {} is not there", path.display());
+        skipped(Need::Chip, &format!("{} is not there", path.display()));
         None
     }
 }

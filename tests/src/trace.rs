@@ -9,7 +9,7 @@ use std::rc::Rc;
 use crate::nor_slot::NorSlot;
 use bridge::protocol::message::{CHUNK, Call, Request, VERSION};
 use bridge::protocol::{Outcome, Server, frame};
-use bridge::{App, Config, Instant, Platform, State, WeightsStore};
+use bridge::{App, Board, Config, Instant, Platform, State, WeightsStore};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
@@ -154,6 +154,12 @@ impl Platform for Machine {
             self.0.wait_until(due);
         }
     }
+}
+
+impl Board<AXES> for Machine {
+    type Glove = Tap<Faulty<MemoryWire>>;
+    type Gripper = ThreeFinger<Tap<Faulty<MemoryWire>>>;
+    type Flash = NorSlot;
 }
 
 #[derive(Clone, Default)]

@@ -3,7 +3,7 @@
 //!
 //! The tests run a part of each campaign; `cargo xtask campaign` runs the whole ones (the ignored tests).
 
-use bridge::{App, Config, Epoch, Instant, Platform, State};
+use bridge::{App, Board, Config, Epoch, Instant, Platform, State};
 use glove::scan::Scanner;
 use gripper::driver::{self, ThreeFinger};
 use gripper::{Activation, Duration, timing};
@@ -81,7 +81,13 @@ fn waving(time_s: f64) -> [f32; 25] {
     hand((0.5 - 0.5 * (time_s * core::f64::consts::PI / 2.0).cos()) as f32)
 }
 
-type Loop = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, NorSlot, 4>;
+impl Board<4> for Machine {
+    type Glove = MemoryWire;
+    type Gripper = ThreeFinger<MemoryWire>;
+    type Flash = NorSlot;
+}
+
+type Loop = App<Machine, 4>;
 
 struct Bench {
     app: Loop,

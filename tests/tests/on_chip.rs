@@ -2,6 +2,7 @@
 //! while flashing, bad input. Skipped, with a word, where QEMU or the firmware is missing.
 #![allow(missing_docs)]
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use bridge::protocol::message::{Answer, Call, Refusal, Restart};
@@ -16,36 +17,64 @@ use loop_tests::emulated::{
     Loop, active, alone, bare, cut_power, debugged, flash, flood, hold_clutch, restarted,
 };
 use loop_tests::images::{self, SHAPE, index_finger};
+use rig::skip::{Need, skipped};
 
 /// A machine with much to do can keep the emulator waiting for longer than a sample may be old; the bridge then holds, as
 /// it should, and the stretch says nothing about the loop.
-const STRETCHES: usize = 3;
+const STRETCHES: usize = 5;
+/// A thread that wanted to sleep for a millisecond and slept so long was kept waiting, and so was the emulator: as long as two
+/// of the glove's frames are apart, after which the newest sample is too old.
+const BUSY: Duration = Duration::from_millis(60);
 
+/// Does `work`; the longest that a thread of this test had to wait for the processor meanwhile.
+fn kept_waiting<T>(work: impl FnOnce() -> T) -> (T, Duration) {
+    let done = AtomicBool::new(false);
+    std::thread::scope(|scope| {
+        let watch = scope.spawn(|| {
+            let mut longest = Duration::ZERO;
+            while !done.load(Ordering::Relaxed) {
+                let before = Instant::now();
+                std::thread::sleep(Duration::from_millis(1));
+                longest = longest.max(before.elapsed());
+            }
+            longest
+        });
+        let outcome = work();
+        done.store(true, Ordering::Relaxed);
+        (outcome, watch.join().expect("no panic"))
+    })
+}
+
+/// One stretch without a hold is enough. Where none is, that is the loop's fault, but where this machine was seen to be busy
+/// in every one of them; and a chip that answered nothing at all is never excused.
 #[test]
 fn every_fresh_glove_frame_is_answered_and_no_byte_is_lost_in_the_queues() {
     let Some(firmware) = firmware() else { return };
     let _alone = alone();
     let mut whole = Loop::start(&firmware);
-    let stretches: Vec<_> = (0..STRETCHES)
-        .map(|_| {
-            let stretch = whole.follow(Duration::from_secs(10));
-            println!("{stretch:?}");
-            stretch
-        })
-        .scan(false, |done, stretch| {
-            let last = std::mem::replace(done, stretch.followed_throughout);
-            (!last).then_some(stretch)
-        })
-        .collect();
-    for stretch in &stretches {
+    let mut seen = Vec::new();
+    for _ in 0..STRETCHES {
+        let (stretch, waited) = kept_waiting(|| whole.follow(Duration::from_secs(10)));
+        println!("{stretch:?}, this test was kept waiting for up to {waited:?}");
         let grown = stretch.grown;
         // The newest frame of a look may be answered after it.
         assert!(grown.following_frames.abs_diff(grown.answered_frames) <= 1);
         assert_eq!(grown.bytes_lost, [0; 3]);
+        seen.push((stretch, waited));
+        if stretch.followed_throughout {
+            break;
+        }
     }
-    let Some(calm) = stretches.iter().find(|stretch| stretch.followed_throughout) else {
-        println!("skipped: this machine kept the emulator waiting in every stretch of 10 s");
-        return;
+    let Some((calm, _)) = seen.iter().find(|(stretch, _)| stretch.followed_throughout) else {
+        let answered: u32 = seen.iter().map(|(s, _)| s.grown.answered_frames).sum();
+        assert!(answered > 0, "the chip never followed: {seen:?}");
+        let calm = seen.iter().filter(|(_, waited)| *waited < BUSY).count();
+        assert_eq!(
+            calm, 0,
+            "held in every stretch, on a machine with time: {seen:?}"
+        );
+        let why = "this machine kept the emulator waiting in every stretch of 10 s";
+        return skipped(Need::Machine, why);
     };
     assert!(calm.grown.frames > 100, "{calm:?}");
     assert_eq!(calm.grown.unusable_frames, 0);

@@ -1,14 +1,15 @@
 //! The same loop with a gripper of one axis: the map's number of outputs follows the gripper's axes.
 
-use bridge::{App, Config, Instant, Platform, State};
+use bridge::{App, Board, Config, Instant, Platform, State};
 use glove::scan::Scanner;
 use gripper::Gripper;
 use gripper::driver::TwoFinger;
 use gripper::registers::two_finger::Model;
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use loop_tests::bench::{Devices, empty_store};
-use rig::Clock;
+use loop_tests::nor_slot::NorSlot;
 use rig::gripper::Family;
+use rig::{Clock, MemoryWire};
 
 /// The index finger's proximal flexion.
 const JOINT: usize = 5;
@@ -26,6 +27,12 @@ impl Platform for Machine {
         let soonest = Instant::from_ticks(self.0.now().as_ticks() + 1);
         self.0.wait_until(due.max(soonest));
     }
+}
+
+impl Board<1> for Machine {
+    type Glove = MemoryWire;
+    type Gripper = TwoFinger<MemoryWire>;
+    type Flash = NorSlot;
 }
 
 /// A map with `outputs` outputs, each of which closes with the index finger.
@@ -80,7 +87,7 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
         store.begin(image.len()).expect("room");
         store.chunk(0, &image).expect("bytes");
         store.commit().expect("an image of one output");
-        let mut app: App<_, _, _, _, 1> = App::new(
+        let mut app: App<_, 1> = App::new(
             Machine(clock.clone()),
             Scanner::new(glove_wire, glove::scan::Config::default()),
             TwoFinger::new(gripper_wire, model, gripper::driver::Config::default()),
@@ -143,7 +150,7 @@ fn open_and_fist(model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]
     store.begin(image.len()).expect("room");
     store.chunk(0, &image).expect("bytes");
     store.commit().expect("an image of one output");
-    let mut app: App<_, _, _, _, 1> = App::new(
+    let mut app: App<_, 1> = App::new(
         Machine(clock.clone()),
         Scanner::new(glove_wire, glove::scan::Config::default()),
         TwoFinger::new(gripper_wire, model, gripper::driver::Config::default()),

@@ -1,7 +1,7 @@
 //! From a shown hand to a standing gripper, through every byte: the tool's training, the weights store, the virtual
 //! sensors behind the serial bridge, the map, the supervisor, Modbus, the virtual gripper's own fingers.
 
-use bridge::{App, Config, Instant, Platform, State};
+use bridge::{App, Board, Config, Instant, Platform, State};
 use glove::hand::LIMITS;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
@@ -38,7 +38,13 @@ impl Platform for Machine {
     }
 }
 
-type Bridge = App<Machine, MemoryWire, ThreeFinger<MemoryWire>, NorSlot, 4>;
+impl Board<4> for Machine {
+    type Glove = MemoryWire;
+    type Gripper = ThreeFinger<MemoryWire>;
+    type Flash = NorSlot;
+}
+
+type Bridge = App<Machine, 4>;
 
 struct Bench {
     app: Bridge,
@@ -112,6 +118,7 @@ impl Bench {
 fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
     let outcome = train(
         &Request {
+            space: trainer::hand::Space::ThreeFinger,
             motion: &Motion::Generated { seed: SEED },
             schedule: Schedule::Fast,
             epochs: None,

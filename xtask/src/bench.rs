@@ -1,6 +1,6 @@
 //! Benchmarks anyone can run. They print ratios within one run; nothing asserts a time.
 
-use crate::firmware;
+use crate::setup::{self, Thing};
 use crate::step::{self, Failure, cargo};
 use crate::thumb;
 
@@ -20,7 +20,7 @@ pub fn map() -> Result<(), Failure> {
     };
     bench("map on this machine", &[])?;
     bench("instructions on this machine", &["--valgrind"])?;
-    firmware::require_emulator()?;
+    setup::require(&[Thing::Target, Thing::Emulator])?;
     let target = root.join("target/map-count");
     step::run(
         "map for the emulated chip",

@@ -2,6 +2,7 @@
 
 use crate::elf::Program;
 use crate::figures::{self, Figures, Mode};
+use crate::setup::{self, EMULATOR, Thing};
 use crate::step::{self, Failure};
 use crate::{surprises, thumb};
 use std::fs::DirBuilder;
@@ -9,10 +10,9 @@ use std::os::unix::fs::DirBuilderExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-const EMULATOR: &str = "qemu-system-arm";
-
 /// Builds the device crates and the firmware; the path of its ELF file.
 pub fn build() -> Result<PathBuf, Failure> {
+    setup::require(&[Thing::Target])?;
     thumb::build_device_crates()?;
     let root = step::workspace_root();
     let target = root.join("target/firmware");
@@ -86,47 +86,24 @@ pub fn campaign(what: &str) -> Command {
 
 /// A campaign that needs the firmware and QEMU.
 pub fn run_campaign(what: &str) -> Result<(), Failure> {
-    require_emulator()?;
+    setup::require(&[Thing::Emulator])?;
     let elf = build()?;
     step::run(what, campaign(what).env("GAUNTLET_FIRMWARE", elf))
 }
 
 /// Writes down sizes and counts as those of the compiler in use.
 pub fn record() -> Result<(), Failure> {
-    require_emulator()?;
+    setup::require(&[Thing::Emulator])?;
     let elf = build()?;
     inspect(&elf, Mode::Record)?;
     count(&elf, Mode::Record)
-}
-
-/// Makes sure that QEMU is there: installs Debian's package where that is allowed.
-pub fn require_emulator() -> Result<(), Failure> {
-    let is_there = || step::succeeds(Command::new(EMULATOR).arg("--version"));
-    if is_there() {
-        return Ok(());
-    }
-    println!("{EMULATOR}: not installed; trying Debian's package");
-    let installed = step::succeeds(Command::new("apt-get").arg("update"))
-        && step::succeeds(Command::new("apt-get").args([
-            "install",
-            "-y",
-            "--no-install-recommends",
-            EMULATOR,
-        ]));
-    if installed && is_there() {
-        return Ok(());
-    }
-    Err(format!(
-        "no {EMULATOR}, and it could not be installed. Type this and try again, or leave QEMU out with --host-only:\n  \
-         apt-get install -y {EMULATOR}"
-    ))
 }
 
 /// Starts the firmware in QEMU until it is interrupted. `options` may name serial devices for the two other ports:
 /// `--glove PORT`, `--gripper PORT`; a port without one is a socket.
 pub fn emulate(options: &[&str]) -> Result<(), Failure> {
     let devices = devices(options)?;
-    require_emulator()?;
+    setup::require(&[Thing::Emulator])?;
     let elf = build()?;
     let folder = std::env::temp_dir().join(format!("gauntlet-qemu-{}", std::process::id()));
     // Whoever reaches the host's socket can move the gripper: the folder is this user's alone.

@@ -1,34 +1,41 @@
 //! The fuzz targets under cargo-fuzz, which lets coverage guide the input. The tests run the same functions on stable,
 //! over the kept corpus and seeded input.
 
+use crate::setup::{self, Thing};
 use crate::step::{self, Failure, cargo};
 use std::path::Path;
 use std::process::Command;
 
-/// A target, and the package whose tests keep its corpus.
+/// A target, and where the tests of its crate keep its corpus.
 struct Target {
     name: &'static str,
     corpus: &'static str,
+    /// Longest input, bytes.
+    longest: u32,
 }
 
-const TARGETS: [Target; 4] = [
+const fn target(name: &'static str, corpus: &'static str, longest: u32) -> Target {
     Target {
-        name: "gripper_frames",
-        corpus: "crates/gripper/tests/corpus/frames",
-    },
-    Target {
-        name: "gripper_link",
-        corpus: "crates/gripper/tests/corpus/link",
-    },
-    Target {
-        name: "gripper_driver",
-        corpus: "crates/gripper/tests/corpus/driver",
-    },
-    Target {
-        name: "gripper_family",
-        corpus: "crates/gripper/tests/corpus/family",
-    },
+        name,
+        corpus,
+        longest,
+    }
+}
+
+const TARGETS: [Target; 9] = [
+    target("gripper_frames", "crates/gripper/tests/corpus/frames", 1024),
+    target("gripper_link", "crates/gripper/tests/corpus/link", 1024),
+    target("gripper_driver", "crates/gripper/tests/corpus/driver", 1024),
+    target("gripper_family", "crates/gripper/tests/corpus/family", 1024),
+    target("glove_sc18im", "crates/glove/tests/corpus/sc18im", 1024),
+    target("bridge_frames", "crates/bridge/tests/corpus/frames", 2048),
+    target("bridge_server", "crates/bridge/tests/corpus/server", 1024),
+    target("hae_image", "crates/hae/tests/corpus/image", 1024),
+    target("trainer_table", "crates/trainer/tests/corpus/table", 1024),
 ];
+
+/// The crates that have targets.
+const CRATES: [&str; 5] = ["gripper", "glove", "bridge", "hae", "trainer"];
 
 /// How long each target runs.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -50,12 +57,13 @@ impl Length {
 
 /// Runs every target for its time; without a nightly compiler or cargo-fuzz, its stable half.
 pub fn run(length: Length) -> Result<(), Failure> {
-    if let Err(missing) = require() {
+    if let Err(missing) = setup::require(&[Thing::Nightly, Thing::CargoFuzz]) {
         println!("skipped: coverage-guided runs: {missing}");
-        return step::run(
-            "fuzz targets on stable",
-            &mut cargo(&["test", "--locked", "--package", "gripper", "--test", "fuzz"]),
-        );
+        let mut tests = cargo(&["test", "--locked", "--test", "fuzz"]);
+        for name in CRATES {
+            tests.args(["--package", name]);
+        }
+        return step::run("fuzz targets on stable", &mut tests);
     }
     let root = step::workspace_root();
     for target in &TARGETS {
@@ -74,7 +82,8 @@ fn one(root: &Path, target: &Target, length: Length) -> Result<(), Failure> {
         nightly(&["fuzz", "run", "--fuzz-dir", "fuzz", target.name])
             .arg(&grown)
             .arg(root.join(target.corpus))
-            .args(["--", "-seed=1", "-max_len=1024", "-len_control=0", "-print_final_stats=1"])
+            .args(["--", "-seed=1", "-len_control=0", "-print_final_stats=1"])
+            .arg(format!("-max_len={}", target.longest))
             .arg(format!("-max_total_time={seconds}"))
             .current_dir(root),
     )
@@ -87,7 +96,7 @@ fn one(root: &Path, target: &Target, length: Length) -> Result<(), Failure> {
 }
 
 /// `cargo` of the nightly toolchain, whatever toolchain runs this chore.
-fn nightly(arguments: &[&str]) -> Command {
+pub fn nightly(arguments: &[&str]) -> Command {
     let mut command = Command::new("rustup");
     command
         .args(["run", "nightly", "cargo"])
@@ -96,26 +105,4 @@ fn nightly(arguments: &[&str]) -> Command {
         .env_remove("RUSTC")
         .env_remove("RUSTUP_TOOLCHAIN");
     command
-}
-
-/// Makes sure that a nightly compiler and cargo-fuzz are there: installs them where that is allowed.
-fn require() -> Result<(), String> {
-    let has_nightly = || step::succeeds(&mut nightly(&["--version"]));
-    if !has_nightly() {
-        println!("no nightly compiler; trying `rustup toolchain install nightly`");
-        let install = ["toolchain", "install", "nightly", "--profile", "minimal"];
-        step::succeeds(Command::new("rustup").args(install));
-        if !has_nightly() {
-            return Err("no nightly compiler (rustup toolchain install nightly)".into());
-        }
-    }
-    let has_fuzz = || step::succeeds(&mut nightly(&["fuzz", "--version"]));
-    if !has_fuzz() {
-        println!("no cargo-fuzz; trying `cargo install cargo-fuzz`");
-        step::succeeds(&mut cargo(&["install", "cargo-fuzz", "--locked"]));
-        if !has_fuzz() {
-            return Err("no cargo-fuzz (cargo install cargo-fuzz)".into());
-        }
-    }
-    Ok(())
 }

@@ -1,4 +1,4 @@
-//! One entry for the project's chores: `cargo xtask test | firmware | qemu | powercut | same-bits | bench | campaign | fuzz | docs`.
+//! One entry for the project's chores: `cargo xtask setup | test | firmware | qemu | powercut | same-bits | bench | campaign | fuzz | docs`.
 //!
 //! The chores only start other programs (cargo, rustup, apt-get, qemu); what they check lives in the crates.
 
@@ -8,6 +8,8 @@ mod elf;
 mod figures;
 mod firmware;
 mod fuzz;
+mod setup;
+mod skips;
 mod step;
 mod surprises;
 mod test;
@@ -19,8 +21,11 @@ const USAGE: &str = "\
 usage: cargo xtask <chore> [options]
 
 chores:
-  test [--host-only]  everything that must hold before a change lands: format, clippy, docs, the
-                      device crates and the firmware built for the microcontroller, all tests
+  setup               install what the tests use and is not here, saying each line before it runs: the
+                      microcontroller's core library, QEMU, Modbus programs of others (into target/)
+  test [options]      everything that must hold before a change lands: format, clippy, docs, the
+                      device crates and the firmware built for the microcontroller, all tests; as root or
+                      with CI set it does `setup` first, otherwise it says what to type
   firmware            build the device crates (no_std) and the firmware for thumbv7em-none-eabihf; check that
                       the loop cannot panic, that there is no allocator, and that the program has not grown
   figures --record    write sizes and instruction counts down as those of the compiler in use
@@ -38,14 +43,21 @@ chores:
   docs                build the documentation, warnings are errors
 
 options of test:
-  --host-only         leave out what needs the microcontroller's target or QEMU";
+  --host-only         leave out what needs the microcontroller's target or QEMU
+  --no-setup          install nothing
+
+GAUNTLET_REQUIRE=all makes every skipped test an error; so does a list of kinds for theirs: chip (QEMU and the
+firmware), shared (data beside the checkout), peers (programs of others), machine (too busy, or ignoring a signal).";
 
 fn main() -> ExitCode {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
     let outcome = match words.as_slice() {
-        ["test"] => test::run(test::Scope::Everything),
-        ["test", "--host-only"] => test::run(test::Scope::HostOnly),
+        ["setup"] => setup::run(),
+        ["test", options @ ..] => match test::Options::parse(options) {
+            Some(options) => test::run(options),
+            None => return unknown(&words),
+        },
         ["firmware"] => firmware::build().and_then(|elf| {
             println!("firmware: {}", elf.display());
             firmware::inspect(&elf, figures::Mode::Check)
@@ -66,10 +78,7 @@ fn main() -> ExitCode {
             println!("{USAGE}");
             return ExitCode::SUCCESS;
         }
-        _ => {
-            eprintln!("error: unknown chore: {:?}\n\n{USAGE}", words.join(" "));
-            return ExitCode::from(2);
-        }
+        _ => return unknown(&words),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
@@ -78,4 +87,9 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+fn unknown(words: &[&str]) -> ExitCode {
+    eprintln!("error: unknown chore: {:?}\n\n{USAGE}", words.join(" "));
+    ExitCode::from(2)
 }

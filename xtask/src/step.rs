@@ -1,7 +1,7 @@
 //! Running one program as a named step: what it is, how long it took, and a clear word when it fails.
 
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Command, Stdio};
 use std::time::Instant;
 
 /// Why a chore stopped, in words for a person.
@@ -36,6 +36,14 @@ pub fn run(name: &str, command: &mut Command) -> Result<(), Failure> {
     }
     println!("<== {name}: {seconds:.1} s");
     Ok(())
+}
+
+/// Whether `command` starts and ends well; its errors stand on the terminal.
+pub fn says(command: &mut Command) -> bool {
+    command
+        .stdout(Stdio::null())
+        .status()
+        .is_ok_and(|status| status.success())
 }
 
 /// Whether `command` starts and ends well; its output is dropped.

@@ -7,7 +7,7 @@ use std::path::Path;
 
 /// Parts of mangled names at which the loop and the interrupts begin.
 const ROOTS: [&str; 5] = [
-    "12firmware_sim4turn",
+    "8firmware4turn",
     "interrupts4host",
     "interrupts5glove",
     "interrupts7gripper",

@@ -1,7 +1,5 @@
-//! Building for the microcontroller, `thumbv7em-none-eabihf`, and getting its core library where it is missing.
-//!
-//! Three ways, in this order: the installed target; `rustup target add`; `core` built from source with Debian's
-//! compiler for the web target, which ships the library's source.
+//! Building for the microcontroller, `thumbv7em-none-eabihf`: with the toolchain's target, or with `core` built from source
+//! by Debian's compiler for the web target, which ships the library's source. [`crate::setup`] gets either.
 
 use crate::step::{self, Failure, cargo};
 use std::path::{Path, PathBuf};
@@ -13,7 +11,7 @@ const DEVICE_CRATES: [&str; 4] = ["hae", "glove", "gripper", "bridge"];
 const DEBIAN_PACKAGES: [&str; 3] = ["rustc-web", "cargo-web", "rust-web-src"];
 
 /// How `core` for [`TARGET`] comes about on this machine.
-enum Toolchain {
+pub enum Toolchain {
     /// The toolchain in use has the target's library.
     Installed,
     /// Debian's compiler builds the library from source; the path is `rust-lld`'s folder.
@@ -32,7 +30,7 @@ pub fn build_device_crates() -> Result<(), Failure> {
     )
 }
 
-/// A cargo command with `arguments` that can build for [`TARGET`]; sets up what is missing.
+/// A cargo command with `arguments` that can build for [`TARGET`].
 pub fn build_command(arguments: &[&str]) -> Result<Command, Failure> {
     match toolchain()? {
         Toolchain::Installed => Ok(cargo(arguments)),
@@ -74,55 +72,40 @@ pub fn is_installed() -> bool {
     sysroot().is_some_and(|sysroot| has_core(&sysroot))
 }
 
-fn toolchain() -> Result<Toolchain, Failure> {
+/// How this machine builds for [`TARGET`].
+///
+/// # Errors
+/// What is missing.
+pub fn toolchain() -> Result<Toolchain, Failure> {
     let Some(sysroot) = sysroot() else {
         return Err("rustc --print sysroot gave no path; is rustc on the PATH?".into());
     };
-    // For trying the last way on a machine where the first would do.
-    let from_source_wanted = std::env::var_os("GAUNTLET_CORE_FROM_SOURCE").is_some();
-    if !from_source_wanted {
-        if has_core(&sysroot) {
-            return Ok(Toolchain::Installed);
-        }
-        println!("{TARGET}: not installed; trying `rustup target add {TARGET}`");
-        if step::succeeds(Command::new("rustup").args(["target", "add", TARGET]))
-            && has_core(&sysroot)
-        {
-            return Ok(Toolchain::Installed);
-        }
+    if !from_source_wanted() && has_core(&sysroot) {
+        return Ok(Toolchain::Installed);
     }
-    from_source(&sysroot)
-}
-
-fn from_source(sysroot: &Path) -> Result<Toolchain, Failure> {
-    println!(
-        "{TARGET}: building core from source with Debian's packages {}",
-        DEBIAN_PACKAGES.join(", ")
-    );
-    let has_compiler =
-        || Path::new("/usr/bin/cargo").exists() && Path::new("/usr/bin/rustc").exists();
-    let install_line = format!("apt-get install -y {}", DEBIAN_PACKAGES.join(" "));
-    if !has_compiler() || !debian_packages_installed() {
-        let installed = step::succeeds(Command::new("apt-get").arg("update"))
-            && step::succeeds(
-                Command::new("apt-get")
-                    .args(["install", "-y"])
-                    .args(DEBIAN_PACKAGES),
-            );
-        if !installed || !has_compiler() {
-            return Err(format!(
-                "no core library for {TARGET}, and it could not be set up. Type one of these and try again:\n  \
-                 rustup target add {TARGET}\n  {install_line}"
-            ));
-        }
+    let has_compiler = ["/usr/bin/cargo", "/usr/bin/rustc"].map(|path| Path::new(path).exists());
+    if has_compiler != [true; 2] || !debian_packages_installed() {
+        return Err(format!(
+            "no core library for {TARGET}; type: cargo xtask setup"
+        ));
     }
-    let linker_folder = find_linker(sysroot).ok_or_else(|| {
+    let linker_folder = find_linker(&sysroot).ok_or_else(|| {
         format!(
             "no rust-lld under {}; type: rustup component add llvm-tools",
             sysroot.display()
         )
     })?;
     Ok(Toolchain::FromSource { linker_folder })
+}
+
+/// For trying the last way on a machine where the first would do.
+pub fn from_source_wanted() -> bool {
+    std::env::var_os("GAUNTLET_CORE_FROM_SOURCE").is_some()
+}
+
+/// The packages of the last way, in one line.
+pub fn debian_packages() -> String {
+    DEBIAN_PACKAGES.join(" ")
 }
 
 fn debian_packages_installed() -> bool {

@@ -15,7 +15,7 @@
 //! | [`calibration`] | whether the glove is calibrated, and how the newest try ended |
 //! | [`config`] | what a person may set, with ranges |
 //! | [`event`], [`telemetry`] | what happened and what is, for whoever looks |
-//! | [`platform`], [`timing`] | the machine underneath; every time the bridge waits for |
+//! | [`board`], [`timing`] | the home underneath; every time the bridge waits for |
 //!
 //! It allocates nothing, reads no clock but its platform's, and does not know what a port is. `docs/safety.md` says which
 //! rule is kept where. Nothing here was tried on hardware.
@@ -23,12 +23,12 @@
 #![forbid(unsafe_code)]
 
 pub mod app;
+pub mod board;
 pub mod calibration;
 pub mod clutch;
 pub mod config;
 pub mod event;
 pub mod filter;
-pub mod platform;
 pub mod posture;
 pub mod protocol;
 pub mod store;
@@ -37,11 +37,11 @@ pub mod telemetry;
 pub mod timing;
 
 pub use app::App;
+pub use board::{Board, Platform, Slot};
 pub use calibration::CalibrationState;
 pub use clutch::{Clutch, Epoch};
 pub use config::{Config, SafeAction, Settings};
 pub use event::Event;
-pub use platform::{Platform, Slot};
 pub use store::WeightsStore;
 pub use supervisor::{GripperFault, HoldReason, State, Supervisor};
 pub use telemetry::Telemetry;

@@ -3,7 +3,7 @@
 mod common;
 
 use bridge::app::expected;
-use bridge::{App, Config, HoldReason, Instant, Platform, State, WeightsStore};
+use bridge::{App, Board, Config, HoldReason, Instant, Platform, State, WeightsStore};
 use common::Flash;
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use gripper::driver::ThreeFinger;
@@ -158,6 +158,12 @@ impl Platform for Counted {
     }
 }
 
+impl Board<4> for Counted {
+    type Glove = Port;
+    type Gripper = ThreeFinger<Port>;
+    type Flash = Flash<4096>;
+}
+
 #[test]
 fn no_dead_or_babbling_device_makes_a_step_long_or_the_supervisor_late() {
     for (glove_port, gripper_port) in ALL
@@ -171,7 +177,7 @@ fn no_dead_or_babbling_device_makes_a_step_long_or_the_supervisor_late() {
             Flash::<4096>::new(64 * 1024, &power),
             Flash::new(64 * 1024, &power),
         ];
-        let mut app = App::<_, _, _, _, 4>::new(
+        let mut app = App::<_, 4>::new(
             Counted { now: 0 },
             glove::scan::Scanner::new(glove, glove::scan::Config::default()),
             ThreeFinger::new(gripper, gripper::driver::Config::default()),

@@ -299,8 +299,16 @@ fn a_server_of_one_client_is_told_as_such() {
     // While somebody else has it, nothing else is blamed.
     let mut address = place.trim_start_matches("tcp:").split(':');
     let (host, port) = (address.next().unwrap(), address.next().unwrap());
+    let being_served = |count: usize| {
+        let end = std::time::Instant::now() + ms(60_000);
+        while served.load(std::sync::atomic::Ordering::SeqCst) != count {
+            assert!(std::time::Instant::now() < end, "never {count} served");
+            std::thread::sleep(ms(1));
+        }
+    };
+    being_served(0);
     let _other = std::net::TcpStream::connect((host, port.parse().unwrap())).unwrap();
-    std::thread::sleep(ms(200));
+    being_served(1);
     let wrong = the_wrong_thing("--gripper", &place);
     contains(
         &wrong,

@@ -4,7 +4,8 @@
 mod support;
 
 use support::samples::{Files, pairs};
-use support::{command, finish, interrupt, json, refusal, run, text};
+use support::told::interrupted_at;
+use support::{json, refusal, run, text};
 use trainer::algorithm::Schedule;
 use trainer::data::{Pairs, write_samples};
 
@@ -218,7 +219,7 @@ fn ctrl_c_keeps_the_state_and_says_how_to_go_on() {
         files.text_of("map.safetensors"),
         files.text_of("c.checkpoint"),
     );
-    let child = command(&[
+    let words = [
         "train",
         "--input",
         &q,
@@ -232,14 +233,8 @@ fn ctrl_c_keeps_the_state_and_says_how_to_go_on() {
         &state,
         "--epochs",
         "1000000",
-    ])
-    .stdout(std::process::Stdio::piped())
-    .stderr(std::process::Stdio::piped())
-    .spawn()
-    .unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(1500));
-    interrupt(&child);
-    let output = finish(child);
+    ];
+    let (output, _) = interrupted_at("\ntraining ", &words);
     let said = refusal(&output, 1);
     assert!(
         said.contains("interrupted") && said.contains("c.checkpoint"),

@@ -1,7 +1,7 @@
 //! Modbus programs of others against `gauntlet simulate --gripper`: pymodbus and minimalmodbus (PyPI), mbpoll (Debian).
 //!
-//! Where one of them is not there and cannot be had, the test says `skipped: …` and passes; under `CI=true` nothing is
-//! installed. `GAUNTLET_PEERS_PYTHON` names a Python that has the two packages.
+//! Where one of them is not there the test is skipped; `cargo xtask setup` gets them, and `cargo xtask test` names the Python
+//! that has the two packages in `GAUNTLET_PEERS_PYTHON`.
 #![allow(missing_docs, clippy::unwrap_used)]
 
 mod support;
@@ -9,6 +9,7 @@ mod support;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 
+use rig::skip::{Need, skipped};
 use support::{Simulation, finish, text};
 
 fn output(command: &mut Command) -> Option<Output> {
@@ -24,44 +25,19 @@ fn works(command: &mut Command) -> bool {
     output(command).is_some_and(|output| output.status.success())
 }
 
-fn is_ci() -> bool {
-    std::env::var("CI").is_ok_and(|ci| ci == "true")
-}
-
-/// A Python with `package`: the one named, the system's, or a fresh environment in `folder`.
-fn python(package: &str, folder: &Path) -> Option<PathBuf> {
+/// A Python with `package`: the one named, or the system's.
+fn python(package: &str) -> Option<PathBuf> {
     let named = std::env::var_os("GAUNTLET_PEERS_PYTHON").map(PathBuf::from);
-    let candidates = named.into_iter().chain([PathBuf::from("python3")]);
-    let has = |python: &PathBuf| {
+    let mut candidates = named.into_iter().chain([PathBuf::from("python3")]);
+    candidates.find(|python| {
         works(Command::new(python).args(["-c", &format!("import {package}, serial")]))
-    };
-    if let Some(python) = candidates.clone().find(has) {
-        return Some(python);
-    }
-    if is_ci() {
-        return None;
-    }
-    let made = works(Command::new("python3").args(["-m", "venv"]).arg(folder));
-    let python = folder.join("bin/python");
-    let pip = [
-        "-m",
-        "pip",
-        "install",
-        "-q",
-        "--timeout",
-        "10",
-        "--retries",
-        "1",
-    ];
-    let installed = made && works(Command::new(&python).args(pip).args([package, "pyserial"]));
-    installed.then_some(python)
+    })
 }
 
 fn python_peer(package: &str, place: Option<&str>) {
-    let folder = tempfile::tempdir().unwrap();
-    let Some(python) = python(package, folder.path()) else {
-        println!("skipped: {package} is not there and cannot be installed");
-        return;
+    let Some(python) = python(package) else {
+        let why = format!("no Python with {package} and pyserial (`cargo xtask setup` makes one)");
+        return skipped(Need::Peers, &why);
     };
     let mut simulation = Simulation::with(false, Some(place.unwrap_or("gripper")), &[]);
     let script = Path::new(env!("CARGO_MANIFEST_DIR"))
@@ -96,8 +72,7 @@ fn minimalmodbus_reads_and_writes() {
 #[test]
 fn mbpoll_reads_the_status() {
     if output(Command::new("mbpoll").arg("-V")).is_none() {
-        println!("skipped: mbpoll is not installed (Debian: apt install mbpoll)");
-        return;
+        return skipped(Need::Peers, "no mbpoll (`cargo xtask setup` installs it)");
     }
     let mut simulation = Simulation::start(false, true);
     // Registers as hexadecimal from 2000 (0x07D0) on, counted from 0, 8 of them, once.

@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 
 use gripper::driver::ThreeFinger;
 use gripper::registers::{COMMAND, STATUS, three_finger};
-use gripper::{Activation, Gripper, Motion, Status};
+use gripper::{Activation, Event, Gripper, Motion, Status};
 use host::clock::Clock;
 use host::interrupt::Interrupt;
 use host::lines::tcp::{Address, Error, Port, UNIT};
@@ -47,7 +47,7 @@ fn until(
     loop {
         let now = clock.now();
         driver.set_motion(motion, now);
-        let heard = driver.poll(now);
+        let heard = driver.poll(now).and_then(Event::ended);
         if done(driver, heard) {
             return;
         }
@@ -64,12 +64,7 @@ fn hex(text: &str) -> Vec<u8> {
 
 /// The golden frames' TCP lines: tag, direction, bytes; `None` where the shared data are absent.
 fn golden() -> Option<Vec<(String, String, Vec<u8>)>> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../../shared/data/robotiq/golden_frames.txt");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is absent", path.display());
-        return None;
-    };
+    let text = rig::skip::shared("robotiq/golden_frames.txt")?;
     let lines = text.lines().filter(|line| line.starts_with("TCP"));
     let parse = |line: &str| {
         let (head, _) = line.split_once(';')?;

@@ -6,6 +6,7 @@ mod support;
 use std::path::Path;
 use std::process::Stdio;
 use std::time::Duration;
+use support::told::interrupted_at;
 use support::{command, finish, interrupt, json, poses_file, refusal, run, text};
 
 fn reproduce(folder: &Path, words: &[&str]) -> std::process::Output {
@@ -274,16 +275,8 @@ fn a_hand_s_table_ends_soon_after_ctrl_c_and_goes_on_with_what_is_done() {
         "--epochs",
         "4000",
     ];
-    let child = command(&words)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    std::thread::sleep(Duration::from_secs(2));
-    interrupt(&child);
-    let asked = std::time::Instant::now();
-    let output = finish(child);
+    let (output, took) = interrupted_at("\ntrainings ", &words);
     let said = refusal(&output, 1);
     assert!(said.contains("interrupted"), "{said}");
-    assert!(asked.elapsed() < Duration::from_secs(20));
+    assert!(took < Duration::from_secs(20));
 }

@@ -30,6 +30,7 @@ use rig::gripper::{Config, Family, VirtualGripper};
 use rustix::process::{Pid, Signal, kill_process};
 use support::devices::behind_pty;
 use support::lines::{Pieces, Shaped, at_once};
+use support::told::Told;
 use support::{Simulation, interrupt, model, run, start, text, until_line, wait};
 
 fn ready(family: Family) -> VirtualGripper {
@@ -294,11 +295,14 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
         "--seconds",
         "120",
     ]);
-    let rest = until_line(teleop.stdout.take().unwrap(), "following");
+    let said = Told::by(teleop.stdout.take().unwrap());
+    let mut seen = said.until(0, "following");
     let id = Pid::from_raw(i32::try_from(teleop.id()).unwrap()).unwrap();
     let (mut commands, mut moved) = (0, 0.0);
     for stall in 0..4_u64 {
-        std::thread::sleep(Duration::from_millis(1_500 + 7 * stall));
+        // It goes on; the stop comes at another place of its cycle each time.
+        seen = said.until(seen, "finger A");
+        std::thread::sleep(Duration::from_millis(500 + 7 * stall));
         kill_process(id, Signal::STOP).unwrap();
         std::thread::sleep(Duration::from_millis(60));
         // Meanwhile somebody else sends it far away.
@@ -334,7 +338,7 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     wait(&mut teleop);
     assert!(moved > 50.0, "nobody moved the gripper meanwhile: {moved}");
     assert!(commands > 0, "no command came after any of the stalls");
-    rest.join().unwrap();
+    said.all();
 }
 
 /// Answers a flash as a bridge does; `before` is put in front of reply number n.

@@ -5,6 +5,7 @@ mod support;
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};
+use support::told::interrupted_at;
 use support::{command, finish, interrupt, json, model, poses_file, refusal, run};
 
 #[test]
@@ -68,23 +69,11 @@ fn ctrl_c_ends_a_training_soon_and_leaves_no_model() {
     let folder = tempfile::tempdir().unwrap();
     let poses = poses_file(folder.path(), 200);
     let out = folder.path().join("model.safetensors");
-    let child = command(&[
-        "train",
-        "--poses",
-        poses.to_str().unwrap(),
-        "--out",
-        out.to_str().unwrap(),
-    ])
-    .stdout(Stdio::piped())
-    .stderr(Stdio::piped())
-    .spawn()
-    .unwrap();
-    std::thread::sleep(Duration::from_millis(800));
-    interrupt(&child);
-    let asked = Instant::now();
-    let output = finish(child);
+    let (poses, path) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let words = ["train", "--poses", poses, "--out", path];
+    let (output, took) = interrupted_at("\ntraining ", &words);
     assert!(refusal(&output, 1).contains("interrupted"));
-    assert!(asked.elapsed() < Duration::from_secs(20));
+    assert!(took < Duration::from_secs(20));
     assert!(!out.exists());
 }
 

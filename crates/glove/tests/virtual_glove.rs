@@ -53,12 +53,7 @@ fn a_scan_takes_about_as_long_as_its_bytes() {
 
 #[test]
 fn recorded_hand_through_bytes_and_back_within_a_fifth_of_a_degree() {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../shared/data/hand/recorded_hand_30hz.csv"
-    );
-    let Ok(text) = std::fs::read_to_string(path) else {
-        println!("skipped: no recorded hand at {path}");
+    let Some(text) = rig::skip::shared("hand/recorded_hand_30hz.csv") else {
         return;
     };
     let rows = read_angles(&text);

@@ -11,7 +11,7 @@ use gripper::link::{self, Debt, Link};
 use gripper::registers::STATUS;
 use gripper::registers::two_finger::Model;
 use gripper::rtu::Request;
-use gripper::{Duration, Gripper, Motion, Status, timing};
+use gripper::{Duration, Event, Gripper, Motion, Status, timing};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use support::{CHARACTER, Line, Slave, at};
@@ -35,7 +35,8 @@ impl<const X: usize> Hand<X> {
         let heard = bench.driver.poll(now);
         let left = bench.driver.counters().writes != before;
         let command = self.command.filter(|_| left);
-        if let Some(Ok(status)) = heard {
+        assert_eq!(left, heard == Some(Event::Sent), "told when it leaves");
+        if let Some(Event::Status(status)) = heard {
             assert!(status.stamp < now, "a status is younger than its request");
             self.status = Some(status);
         }

@@ -249,8 +249,11 @@ fn the_driver_runs_its_cycle_against_tokio_modbus() {
                 force: [100; 4],
             };
             driver.set_motion(Some(motion), timer.now());
-            while let Some(outcome) = driver.poll(timer.now()) {
-                let status = outcome.unwrap();
+            while let Some(event) = driver.poll(timer.now()) {
+                let Some(ended) = event.ended() else {
+                    continue;
+                };
+                let status = ended.unwrap();
                 assert_eq!(status.activation, Activation::Ready);
                 cycles += 1;
                 accepted += u32::from(driver.accepted());

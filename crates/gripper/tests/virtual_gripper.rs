@@ -8,7 +8,7 @@ use bench::*;
 use gripper::driver::{Control, Error, Failure, Task};
 use gripper::registers::three_finger::Mode;
 use gripper::registers::two_finger::{Model, Release};
-use gripper::{Activation, Contact, Duration, Fault, Gripper, Motion};
+use gripper::{Activation, Contact, Duration, Event, Fault, Gripper, Motion};
 
 #[test]
 fn nothing_moves_before_activation_is_asked_for() {
@@ -34,6 +34,39 @@ fn nothing_moves_before_activation_is_asked_for() {
         bench.truth.command_block(),
         [1, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0]
     );
+}
+
+#[test]
+fn a_motion_that_leaves_is_told_once_and_an_activation_is_none() {
+    let mut bench = three();
+    let told = |bench: &mut Three, cycles: u32| {
+        let (mut sent, mut ended) = (0, 0);
+        while ended < cycles {
+            let now = bench.clock.now();
+            match bench.driver.poll(now) {
+                Some(Event::Sent) => sent += 1,
+                Some(event) => ended += u32::from(event.ended().is_some()),
+                None => {}
+            }
+            let due = bench.driver.next_due().max(now + Duration::from_micros(1));
+            bench.clock.wait_until(due);
+        }
+        sent
+    };
+    bench.driver.activate();
+    assert_eq!(told(&mut bench, 1_000), 0);
+    let activating = bench.driver.counters().writes;
+    assert!(activating > 0);
+    for _ in 0..10 {
+        let motion = Motion {
+            position: [50; 4],
+            speed: [255; 4],
+            force: [255; 4],
+        };
+        bench.driver.set_motion(Some(motion), bench.clock.now());
+        assert_eq!(told(&mut bench, 1), 1);
+    }
+    assert_eq!(bench.driver.counters().writes, activating + 10);
 }
 
 #[test]

@@ -5,7 +5,7 @@ mod bench;
 
 use bench::*;
 use gripper::driver::{Config, ThreeFinger};
-use gripper::{Duration, Gripper, Instant, Motion};
+use gripper::{Duration, Event, Gripper, Instant, Motion};
 use rig::gripper::Config as Virtual;
 
 #[test]
@@ -183,9 +183,9 @@ fn stroke_cut_after(cut: u64) -> ([f32; 4], u64) {
         bench.driver.set_motion(Some(motion), bench.clock.now());
         let now = bench.clock.now();
         match bench.driver.poll(now) {
-            Some(Ok(fresh)) => status = fresh,
-            Some(Err(error)) => panic!("{error}"),
-            None => bench
+            Some(Event::Status(fresh)) => status = fresh,
+            Some(Event::Failed(error)) => panic!("{error}"),
+            Some(Event::Sent) | None => bench
                 .clock
                 .wait_until(bench.driver.next_due().max(now + Duration::from_micros(1))),
         }

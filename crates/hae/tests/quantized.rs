@@ -378,11 +378,7 @@ fn a_16_bit_map_has_no_other_order() {
 
 /// The angles of a recorded hand: every column but the time and the clip's name.
 fn recorded_hand() -> Option<Vec<f32>> {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../shared/data/hand/recorded_hand_30hz.csv"
-    );
-    let text = std::fs::read_to_string(path).ok()?;
+    let text = rig::skip::shared("hand/recorded_hand_30hz.csv")?;
     let mut lines = text.lines();
     let is_angle: Vec<bool> = lines
         .next()?
@@ -403,7 +399,6 @@ fn recorded_hand() -> Option<Vec<f32>> {
 #[cfg_attr(miri, ignore = "reads a file")]
 fn over_a_recorded_hand_the_error_is_a_thousandth_of_the_output_range() {
     let Some(poses) = recorded_hand() else {
-        println!("skipped: the recorded hand is not beside this project");
         return;
     };
     assert_eq!(poses.len() % 25, 0);

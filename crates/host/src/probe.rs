@@ -7,7 +7,7 @@ use anyhow::Result;
 use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::{Driver, Family, ThreeFinger, TwoFinger};
 use gripper::registers::Kind;
-use gripper::{Activation, Gripper};
+use gripper::{Activation, Event, Gripper};
 
 use crate::clock::Clock;
 use crate::diagnose;
@@ -192,9 +192,9 @@ where
     let end = Instant::now() + GRIPPER_WAIT;
     while Instant::now() < end && !interrupt.sleep(LOOK) {
         match driver.poll(clock.now()) {
-            Some(Ok(status)) => return Ok(status.activation),
-            Some(Err(gripper::Error::OtherGripper(kind))) => return Err(Some(kind)),
-            Some(Err(_)) | None => {}
+            Some(Event::Status(status)) => return Ok(status.activation),
+            Some(Event::Failed(gripper::Error::OtherGripper(kind))) => return Err(Some(kind)),
+            Some(Event::Failed(_) | Event::Sent) | None => {}
         }
     }
     Err(None)

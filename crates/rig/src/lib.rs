@@ -14,6 +14,7 @@
 //! | [`pty::PtyDevice`] | the same device behind a pseudo-terminal, in real time |
 //! | [`faulty::Faulty`] | any port, with bytes lost, flipped, doubled, late |
 //! | [`flash::Nor`] | NOR flash in memory, which can lose power |
+//! | [`skip`] | what a test says that cannot run here |
 //!
 //! Nothing here is tried on hardware: it follows the documents.
 #![forbid(unsafe_code)]
@@ -27,6 +28,7 @@ pub mod gripper;
 mod line;
 mod pose;
 pub mod pty;
+pub mod skip;
 mod wire;
 
 pub use clock::{Clock, Duration, EventSource, Instant};

@@ -98,12 +98,7 @@ fn its_block_is_three_registers_long() {
 
 #[test]
 fn every_golden_request_on_the_serial_line_is_answered() {
-    let path = concat!(
-        env!("CARGO_MANIFEST_DIR"),
-        "/../../../shared/data/robotiq/golden_frames.txt"
-    );
-    let Ok(text) = std::fs::read_to_string(path) else {
-        println!("skipped: no golden_frames.txt beside the repository");
+    let Some(text) = rig::skip::shared("robotiq/golden_frames.txt") else {
         return;
     };
     let mut asked = 0;

@@ -1,5 +1,5 @@
-//! The board: the only code that knows addresses. A second board is a second module with the same public items;
-//! `docs/porting.md` lists them.
+//! The board: the only code that knows addresses. Another board is another module like this one: a [`firmware::Chip`] and
+//! its devices; `docs/porting.md` lists what each part must do.
 
 mod flash;
 mod interrupts;
@@ -9,61 +9,94 @@ mod time;
 mod uart;
 mod watchdog;
 
+use bridge::gripper::driver::{self, ThreeFinger};
+use bridge::gripper::timing;
+use bridge::protocol::Machine;
 use bridge::protocol::message::Restart;
-pub use flash::PsramSlot;
+use bridge::{Board, Instant, Platform};
+use firmware::{AXES, Chip, Devices};
+use flash::PsramSlot;
 pub use restart::restart;
-pub use stack::StackWatch;
-pub use time::{SystemTime, wait_for_interrupt};
-use uart::Uart;
-pub use uart::{Port, bytes_lost};
-pub use watchdog::Watchdog;
+use stack::StackWatch;
+use time::{SystemTime, wait_for_interrupt};
+use uart::{Port, Uart, bytes_lost};
+use watchdog::Watchdog;
 
 /// The processor's and the peripheral bus's clock of the emulated board, in hertz (Arm AN386).
 pub const CLOCK_HZ: u32 = 25_000_000;
 
-/// From the end of a request to the start of the gripper's reply, at most. An emulator's bytes wait for a PC that has other
-/// work; a chip's own UART would take [`bridge::gripper::timing::RESPONSE`].
-pub const GRIPPER_RESPONSE: bridge::Duration = bridge::gripper::timing::RESPONSE_PC;
-
-/// Everything the program owns; made once.
-pub struct Board {
-    /// Monotonic time.
-    pub time: SystemTime,
-    /// The host protocol's line (UART 0).
-    pub host: Port,
-    /// The glove's line (UART 1).
-    pub glove: Port,
-    /// The gripper's line (UART 2).
-    pub gripper: Port,
-    /// The two halves of the weights flash.
-    pub slots: [PsramSlot; 2],
-    /// Resets the machine unless fed.
-    pub watchdog: Watchdog,
-    /// Tells how deep the stack has been.
-    pub stack: StackWatch,
-    /// Why the machine started.
-    pub started: Restart,
+/// The emulated board.
+pub struct Mps2 {
+    time: SystemTime,
+    watchdog: Watchdog,
+    stack: StackWatch,
+    started: Restart,
 }
 
-impl Board {
-    /// Sets the board up: clock tick, ports with their interrupts, flash. `None` on a second call.
-    pub fn take() -> Option<Self> {
-        let core = cortex_m::Peripherals::take()?;
-        let time = SystemTime::start(core.SYST);
-        let host = Port::open(Uart::Host)?;
-        let glove = Port::open(Uart::Glove)?;
-        let gripper = Port::open(Uart::Gripper)?;
-        let slots = flash::slots();
-        interrupts::enable();
-        Some(Self {
-            time,
-            host,
-            glove,
-            gripper,
-            slots,
-            watchdog: Watchdog::new(),
-            stack: StackWatch::start(),
-            started: restart::take(),
-        })
+/// Sets the board up: clock tick, ports with their interrupts, flash. `None` on a second call.
+pub fn take() -> Option<(Mps2, Devices<Mps2>)> {
+    let core = cortex_m::Peripherals::take()?;
+    let time = SystemTime::start(core.SYST);
+    let devices = Devices {
+        host: Port::open(Uart::Host)?,
+        glove: Port::open(Uart::Glove)?,
+        gripper: Port::open(Uart::Gripper)?,
+        slots: flash::slots(),
+    };
+    interrupts::enable();
+    let board = Mps2 {
+        time,
+        watchdog: Watchdog::new(),
+        stack: StackWatch::start(),
+        started: restart::take(),
+    };
+    Some((board, devices))
+}
+
+impl Platform for Mps2 {
+    fn now(&mut self) -> Instant {
+        self.time.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        if self.time.now() < due {
+            wait_for_interrupt();
+        }
+    }
+}
+
+impl Board<AXES> for Mps2 {
+    type Glove = Port;
+    type Gripper = ThreeFinger<Port>;
+    type Flash = PsramSlot;
+}
+
+impl Chip for Mps2 {
+    type Host = Port;
+    type Line = Port;
+
+    fn gripper(line: Port) -> ThreeFinger<Port> {
+        let config = driver::Config {
+            // An emulator's bytes wait for a PC that has other work; a chip's own UART takes the default.
+            response: timing::RESPONSE_PC,
+            ..driver::Config::default()
+        };
+        ThreeFinger::new(line, config)
+    }
+
+    fn start_watchdog(&mut self) {
+        self.watchdog.start();
+    }
+
+    fn feed_watchdog(&mut self) {
+        self.watchdog.feed();
+    }
+
+    fn machine(&mut self) -> Machine {
+        Machine {
+            bytes_lost: bytes_lost(),
+            stack_used: self.stack.look(),
+            restart: self.started,
+        }
     }
 }

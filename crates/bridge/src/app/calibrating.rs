@@ -1,15 +1,13 @@
 //! Calibrating on the flat hand: before engaging, on a second of stillness, told however it ends, taken back on request.
 
 use super::App;
+use crate::board::Board;
 use crate::calibration::{Refusal, Try};
 use crate::event::Kind;
-use crate::platform::{Platform, Slot};
 use crate::{Duration, Instant};
-use embedded_io::{Read, ReadReady, Write};
 use glove::hand::flat::{FlatHand, Progress};
 use glove::hand::{Calibration, SEGMENT_COUNT};
 use glove::scan::Frame;
-use gripper::Gripper;
 
 /// What is known of calibrating beside the calibration in use.
 #[derive(Debug, Clone, Default)]
@@ -29,13 +27,7 @@ struct Replaced {
     distrusted: u16,
 }
 
-impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
+impl<B: Board<X>, const X: usize> App<B, X> {
     /// Takes the hand, flat and still for a second, as all joints at zero, within [`glove::timing::STILL_WAIT`]. An event and
     /// [`Telemetry::calibration`](crate::Telemetry) tell the end. Refused while the clutch is closed.
     pub fn calibrate_flat_hand(&mut self) {
@@ -44,7 +36,7 @@ where
 
     /// The same, with as much time as a person needs.
     pub fn calibrate_flat_hand_within(&mut self, wait: Duration) {
-        let now = self.platform.now();
+        let now = self.board.now();
         if self.is_engaged() {
             return self.end_try(now, Try::Refused(Refusal::Engaged));
         }
@@ -55,7 +47,7 @@ where
 
     /// Takes a calibration that was made before. Refused, with an event, while the clutch is closed.
     pub fn set_calibration(&mut self, calibration: Calibration) {
-        let now = self.platform.now();
+        let now = self.board.now();
         if self.is_engaged() {
             return self.end_try(now, Try::Refused(Refusal::Engaged));
         }
@@ -65,7 +57,7 @@ where
     /// Takes the calibration back that the newest one replaced; none, where there was none. Once: the one before that is
     /// gone. Refused, with an event, while the clutch is closed.
     pub fn undo_calibration(&mut self) {
-        let now = self.platform.now();
+        let now = self.board.now();
         if self.is_engaged() {
             return self.end_try(now, Try::Refused(Refusal::Engaged));
         }

@@ -8,26 +8,21 @@
 //! counts elapsed time, so the additional steps change no limit. The grid does not move with them.
 //!
 //! **What `latency` measures.** From the stamp of the oldest sample used (when its request was sent) to the moment the
-//! driver handed the request that carries the command to its port: seen by the link's count of writing requests going up
-//! in a poll while the command is set. The 29 bytes of the request then take 2.5 ms at 115200 baud.
+//! driver handed the request that carries the command to its port ([`gripper::Event::Sent`]). The 29 bytes of the request then take 2.5 ms at 115200 baud.
 
 mod calibrating;
-mod controls;
 mod tick;
 
-pub use controls::Controls;
-
+use crate::board::Board;
 use crate::clutch::{Clutch, Epoch, HeartbeatRefusal, Position};
 use crate::config::Config;
 use crate::event::{self, Event, Kind, Request};
-use crate::platform::{Platform, Slot};
 use crate::posture::Posture;
 use crate::store::{Expected, WeightsStore};
 use crate::supervisor::{Hand, State, Supervisor};
 use crate::telemetry::{Sent, Telemetry};
 use crate::{HIDDEN, Instant};
 use calibrating::Calibrating;
-use embedded_io::{Read, ReadReady, Write};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::Scanner;
 use gripper::{Gripper, Status};
@@ -41,19 +36,18 @@ pub const fn expected(axes: usize) -> Expected {
     }
 }
 
-/// The bridge: `P` the machine, `G` the glove's port, `R` the gripper, `F` a flash slot, `X` the gripper's number of axes.
-#[derive(Debug)]
-pub struct App<P, G, R, F, const X: usize>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
-    platform: P,
-    scanner: Scanner<G>,
-    gripper: R,
-    store: WeightsStore<F>,
+/// What a board's gripper says where a cycle fails.
+pub type GripperError<B, const X: usize> = <<B as Board<X>>::Gripper as Gripper<X>>::Error;
+
+/// How a cycle of a board's gripper ended.
+type CycleEnd<B, const X: usize> = Result<Status<X>, GripperError<B, X>>;
+
+/// The bridge: `B` its home, `X` the gripper's number of axes.
+pub struct App<B: Board<X>, const X: usize> {
+    board: B,
+    scanner: Scanner<B::Glove>,
+    gripper: B::Gripper,
+    store: WeightsStore<B::Flash>,
     supervisor: Supervisor<X>,
     posture: Posture,
     hand: Option<Hand<X>>,
@@ -64,14 +58,24 @@ where
     due: Option<Instant>,
     /// What the driver was told last; `at` is when it was decided until it leaves.
     order: Option<Sent<X>>,
-    stashed: Option<Result<Status<X>, R::Error>>,
-    gripper_error: Option<R::Error>,
+    /// Found in a step's second poll, for the next step.
+    stashed: Option<CycleEnd<B, X>>,
+    gripper_error: Option<GripperError<B, X>>,
     sensors: Sensors,
     calibrating: Calibrating,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
     telemetry: Telemetry<X>,
     events: heapless::Deque<Event, { event::CAPACITY }>,
+}
+
+impl<B: Board<X>, const X: usize> core::fmt::Debug for App<B, X> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.debug_struct("App")
+            .field("telemetry", &self.telemetry)
+            .field("order", &self.order)
+            .finish_non_exhaustive()
+    }
 }
 
 /// What is known of each sensor.
@@ -87,22 +91,16 @@ struct Sensors {
     starts: Option<[u16; SEGMENT_COUNT]>,
 }
 
-impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
+impl<B: Board<X>, const X: usize> App<B, X> {
     /// Ties the parts together. Sends nothing; the newest whole image of the store is the map.
     pub fn new(
-        mut platform: P,
-        scanner: Scanner<G>,
-        gripper: R,
-        store: WeightsStore<F>,
+        mut board: B,
+        scanner: Scanner<B::Glove>,
+        gripper: B::Gripper,
+        store: WeightsStore<B::Flash>,
         config: Config<X>,
     ) -> Self {
-        let now = platform.now();
+        let now = board.now();
         let mut events = heapless::Deque::new();
         if store.active().is_none() {
             // There is room.
@@ -113,7 +111,7 @@ where
         }
         // Built where it will be: a chip's stack has no room for it twice.
         Self {
-            platform,
+            board,
             telemetry: Telemetry::new(now, scanner.state()),
             scanner,
             gripper,
@@ -137,7 +135,7 @@ where
 
     /// Does what is due and returns when the next thing is. Never waits; at most 1 ms, whatever the devices do.
     pub fn step(&mut self) -> Instant {
-        let now = self.platform.now();
+        let now = self.board.now();
         self.poll_gripper(now);
         let frame = self.scanner.poll(now);
         if let Some(frame) = &frame {
@@ -149,8 +147,8 @@ where
             // The line may be free: then the command leaves now. What this poll finds is taken in the next step. By the clock
             // as it is now: where the machine stood still in this very step, the command is too old to leave.
             if self.gripper.next_due() <= now {
-                let now = self.platform.now();
-                self.stashed = self.poll_and_see(now);
+                let now = self.board.now();
+                self.stashed = self.poll_for_end(now);
             }
         }
         self.telemetry.now = now;
@@ -161,14 +159,14 @@ where
     pub fn run(&mut self, mut until: impl FnMut(&mut Self) -> bool) {
         while !until(self) {
             let due = self.step();
-            self.platform.wait_until(due);
+            self.board.wait_until(due);
         }
     }
 
     /// Closes the clutch: **an act of a person**. It stays closed while [`App::heartbeat`] is called with the epoch that comes
     /// back, every 100 ms. A gripper that is [`State::Faulted`] stays so until the clutch was opened.
     pub fn engage(&mut self) -> Epoch {
-        let now = self.platform.now();
+        let now = self.board.now();
         self.epoch = self.epoch.wrapping_add(1);
         self.clutch = Clutch::Closed {
             epoch: self.epoch,
@@ -184,19 +182,19 @@ where
     /// # Errors
     /// The clutch is open, opened by itself, or was closed anew since: nothing changes then.
     pub fn heartbeat(&mut self, epoch: Epoch) -> Result<(), HeartbeatRefusal> {
-        let now = self.platform.now();
+        let now = self.board.now();
         self.clutch.beat(now, epoch)
     }
 
     /// Opens the clutch: the next step holds. Always obeyed.
     pub fn release(&mut self) {
         self.clutch = Clutch::Open;
-        self.due = Some(self.platform.now());
+        self.due = Some(self.board.now());
     }
 
     /// Asks the gripper to activate: **it moves**. Refused, with an event, while it follows the hand.
     pub fn activate(&mut self) {
-        let now = self.platform.now();
+        let now = self.board.now();
         if self.supervisor.state().is_moving() {
             self.tell(now, Kind::Refused(Request::Activate));
         } else {
@@ -247,7 +245,7 @@ where
     }
 
     /// Why the newest failed cycle of the gripper failed.
-    pub fn gripper_error(&self) -> Option<R::Error> {
+    pub fn gripper_error(&self) -> Option<GripperError<B, X>> {
         self.gripper_error
     }
 
@@ -257,33 +255,33 @@ where
     }
 
     /// The weights store. While the clutch is closed it refuses to write.
-    pub fn store_mut(&mut self) -> &mut WeightsStore<F> {
+    pub fn store_mut(&mut self) -> &mut WeightsStore<B::Flash> {
         self.lock();
         &mut self.store
     }
 
     /// The weights store, to look at.
-    pub fn store(&self) -> &WeightsStore<F> {
+    pub fn store(&self) -> &WeightsStore<B::Flash> {
         &self.store
     }
 
     /// The glove's scanner: its counters, its port.
-    pub fn scanner_mut(&mut self) -> &mut Scanner<G> {
+    pub fn scanner_mut(&mut self) -> &mut Scanner<B::Glove> {
         &mut self.scanner
     }
 
     /// The gripper. Setting motions past the bridge is the caller's responsibility; the next step sets its own.
-    pub fn gripper_mut(&mut self) -> &mut R {
+    pub fn gripper_mut(&mut self) -> &mut B::Gripper {
         &mut self.gripper
     }
 
-    /// The platform.
-    pub fn platform_mut(&mut self) -> &mut P {
-        &mut self.platform
+    /// The board, as the clock and the sleep that it is.
+    pub fn platform_mut(&mut self) -> &mut B {
+        &mut self.board
     }
 
     /// Gives everything back.
-    pub fn into_parts(self) -> (P, Scanner<G>, R, WeightsStore<F>) {
-        (self.platform, self.scanner, self.gripper, self.store)
+    pub fn into_parts(self) -> (B, Scanner<B::Glove>, B::Gripper, WeightsStore<B::Flash>) {
+        (self.board, self.scanner, self.gripper, self.store)
     }
 }

@@ -1,47 +1,38 @@
 //! What one step does, piece by piece.
 
-use super::App;
-use crate::event::{Event, Kind};
-use crate::platform::{Platform, Slot};
+use super::{App, CycleEnd};
+use crate::board::Board;
+use crate::event::{self, Kind};
 use crate::posture;
 use crate::supervisor::{Hand, Inputs, Output, State, Weights};
 use crate::telemetry::{Sent, bump};
 use crate::{Duration, HIDDEN, HoldReason, Instant, timing};
-use embedded_io::{Read, ReadReady, Write};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::imu;
 use glove::scan::{Finding, Frame, Health};
 use gripper::registers::Fault;
-use gripper::{Gripper, Status};
+use gripper::{Event, Gripper, Status};
 
-impl<P, G, R, F, const X: usize> App<P, G, R, F, X>
-where
-    P: Platform,
-    G: Read + ReadReady + Write,
-    R: Gripper<X>,
-    F: Slot,
-{
-    /// Polls the gripper and sees whether a command left.
-    pub(super) fn poll_and_see(&mut self, now: Instant) -> Option<Result<Status<X>, R::Error>> {
-        let before = self.gripper.counters().writes;
-        let result = self.gripper.poll(now);
-        let sent = self.gripper.counters().writes != before;
-        if sent
+impl<B: Board<X>, const X: usize> App<B, X> {
+    /// Polls the gripper; a command that left is taken at once, what ended is returned.
+    pub(super) fn poll_for_end(&mut self, now: Instant) -> Option<CycleEnd<B, X>> {
+        let event = self.gripper.poll(now)?;
+        if matches!(event, Event::Sent)
             && let Some(order) = self
                 .order
                 .filter(|order| timing::is_fresh(now, order.stamp))
         {
             self.telemetry.take_sent(Sent { at: now, ..order });
         }
-        result
+        event.ended()
     }
 
     pub(super) fn poll_gripper(&mut self, now: Instant) {
-        let result = match self.stashed.take() {
-            Some(result) => Some(result),
-            None => self.poll_and_see(now),
+        let end = match self.stashed.take() {
+            Some(end) => Some(end),
+            None => self.poll_for_end(now),
         };
-        match result {
+        match end {
             None => {}
             Some(Ok(status)) => self.take_status(now, status),
             Some(Err(error)) => {
@@ -296,7 +287,7 @@ where
     }
 
     pub(super) fn tell(&mut self, at: Instant, kind: Kind) {
-        let event = Event { at, kind };
+        let event = event::Event { at, kind };
         if let Err(event) = self.events.push_back(event) {
             let _ = self.events.pop_front();
             let _ = self.events.push_back(event);

@@ -2,9 +2,8 @@
 
 use super::message::{Call, Request};
 use super::server::Server;
-use crate::Instant;
-use crate::app::Controls;
 use crate::telemetry::bump;
+use crate::{App, Board, Instant};
 use embedded_io::{Read, ReadReady, Write};
 
 /// Most bytes taken from the port a poll: bounds the poll's time.
@@ -12,7 +11,7 @@ const BYTES_A_POLL: usize = 256;
 
 impl<S: Read + ReadReady + Write> Server<S> {
     /// Takes bytes until a request is whole or none are left.
-    pub(super) fn receive<A: Controls<X>, const X: usize>(&mut self, app: &mut A) {
+    pub(super) fn receive<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>) {
         for _ in 0..BYTES_A_POLL {
             let mut byte = [0];
             let more = matches!(self.port.read_ready(), Ok(true));
@@ -40,7 +39,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
     }
 
     /// Whether the request that just came is to be served. A release has been obeyed when this returns.
-    fn is_wanted<A: Controls<X>, const X: usize>(&mut self, app: &mut A) -> bool {
+    fn is_wanted<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>) -> bool {
         match postcard::from_bytes::<Request<'_>>(&self.pending) {
             Ok(Request {
                 call: Call::Release,
@@ -57,10 +56,10 @@ impl<S: Read + ReadReady + Write> Server<S> {
         }
     }
 
-    pub(super) fn serve_pending<A: Controls<X>, const X: usize>(
+    pub(super) fn serve_pending<B: Board<X>, const X: usize>(
         &mut self,
         now: Instant,
-        app: &mut A,
+        app: &mut App<B, X>,
     ) {
         if self.pending.is_empty() {
             return;

@@ -12,4 +12,4 @@ mod server;
 mod slow;
 mod telling;
 
-pub use server::{Board, Outcome, Server};
+pub use server::{Machine, Outcome, Server};

@@ -9,9 +9,8 @@ use super::message::{
 use super::outgoing::Outgoing;
 use super::slow::{Reading, Slow};
 use super::telling::status;
-use crate::app::Controls;
 use crate::store::WeightsStore;
-use crate::{Config, Duration, Instant, Slot, timing};
+use crate::{App, Board, Config, Duration, Instant, Slot, timing};
 use embedded_io::{Read, ReadReady, Write};
 
 /// A host that wrote or held the clutch and then said nothing for so long has lost its session.
@@ -19,7 +18,7 @@ const LEASE: Duration = Duration::from_millis(2_000);
 /// Least time between telemetry samples: at 115200 baud one takes about 14 ms of the line.
 const LEAST_PERIOD_MS: u16 = 20;
 
-/// What a poll asks of the board.
+/// What a poll asks of the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Outcome {
     /// Nothing: go on.
@@ -28,9 +27,9 @@ pub enum Outcome {
     Reboot,
 }
 
-/// What only the board can count.
+/// What only the machine can count.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Board {
+pub struct Machine {
     /// Bytes that the host's, the glove's and the gripper's port have lost.
     pub bytes_lost: [u32; 3],
     /// Most bytes of stack that were ever in use; 0 where nobody looks.
@@ -62,8 +61,8 @@ pub struct Server<S> {
     slow: Option<(Slow, u32, u16)>,
     pub(super) sample: Outgoing,
     rebooting: bool,
-    /// Told by the board.
-    pub(super) board: Board,
+    /// Told by the machine.
+    pub(super) machine: Machine,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -98,7 +97,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
             slow: None,
             sample: Outgoing::EMPTY,
             rebooting: false,
-            board: Board {
+            machine: Machine {
                 bytes_lost: [0; 3],
                 stack_used: 0,
                 restart: Restart::Unknown,
@@ -111,9 +110,9 @@ impl<S: Read + ReadReady + Write> Server<S> {
         &self.port
     }
 
-    /// Tells what only the board knows, for the counters.
-    pub const fn tell_board(&mut self, board: Board) {
-        self.board = board;
+    /// Tells what only the machine knows, for the counters.
+    pub const fn tell_machine(&mut self, machine: Machine) {
+        self.machine = machine;
     }
 
     /// Goes on with whatever is under way: sends, takes bytes, does at most one request or a piece of one. Never waits. `now`
@@ -124,7 +123,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
     ///
     /// Flash that is erased keeps the processor for as long as it takes: one sector a poll. The store refuses to be written
     /// while the clutch is closed.
-    pub fn poll<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) -> Outcome {
+    pub fn poll<B: Board<X>, const X: usize>(
+        &mut self,
+        now: Instant,
+        app: &mut App<B, X>,
+    ) -> Outcome {
         let before = self.polled.replace(now).unwrap_or(now);
         if !timing::is_within(now, before, timing::LONGEST_GAP) {
             // A release among it was obeyed when it came.
@@ -162,11 +165,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
         first.send(&mut self.port) || second.send(&mut self.port)
     }
 
-    pub(super) fn serve<A: Controls<X>, const X: usize>(
+    pub(super) fn serve<B: Board<X>, const X: usize>(
         &mut self,
         now: Instant,
         request: &Request<'_>,
-        app: &mut A,
+        app: &mut App<B, X>,
     ) {
         let &Request {
             session, sequence, ..
@@ -194,7 +197,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
     }
 
     /// The next piece of a request that takes longer than a poll. Its host is waiting, so its session does not end.
-    fn go_on<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &mut A) {
+    fn go_on<B: Board<X>, const X: usize>(&mut self, now: Instant, app: &mut App<B, X>) {
         let Some((mut slow, session, sequence)) = self.slow.take() else {
             return;
         };
@@ -208,11 +211,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
     }
 
     /// The answer to a request; `None` when it comes later.
-    fn answer<A: Controls<X>, const X: usize>(
+    fn answer<B: Board<X>, const X: usize>(
         &mut self,
         now: Instant,
         request: &Request<'_>,
-        app: &mut A,
+        app: &mut App<B, X>,
     ) -> Option<Result<Answer, Refusal>> {
         if let Call::Hello { version } = &request.call {
             return Some(self.hello(now, request, *version, app));
@@ -244,11 +247,11 @@ impl<S: Read + ReadReady + Write> Server<S> {
         None
     }
 
-    fn answer_at_once<A: Controls<X>, const X: usize>(
+    fn answer_at_once<B: Board<X>, const X: usize>(
         &mut self,
         now: Instant,
         call: &Call<'_>,
-        app: &mut A,
+        app: &mut App<B, X>,
     ) -> Result<Answer, Refusal> {
         match call {
             Call::Counters => Ok(Answer::Counters(self.counters(app))),
@@ -298,12 +301,12 @@ impl<S: Read + ReadReady + Write> Server<S> {
         }
     }
 
-    fn hello<A: Controls<X>, const X: usize>(
+    fn hello<B: Board<X>, const X: usize>(
         &mut self,
         now: Instant,
         request: &Request<'_>,
         version: u16,
-        app: &A,
+        app: &App<B, X>,
     ) -> Result<Answer, Refusal> {
         let id = request.session;
         if version != VERSION {
@@ -380,7 +383,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
 }
 
 /// The app, if its clutch is open.
-fn idle<A: Controls<X>, const X: usize>(app: &mut A) -> Result<&mut A, Refusal> {
+fn idle<B: Board<X>, const X: usize>(app: &mut App<B, X>) -> Result<&mut App<B, X>, Refusal> {
     if app.is_engaged() {
         Err(Refusal::Engaged)
     } else {
@@ -388,9 +391,9 @@ fn idle<A: Controls<X>, const X: usize>(app: &mut A) -> Result<&mut A, Refusal> 
     }
 }
 
-fn configure<A: Controls<X>, const X: usize>(
+fn configure<B: Board<X>, const X: usize>(
     configuration: &Configuration,
-    app: &mut A,
+    app: &mut App<B, X>,
 ) -> Result<Answer, Refusal> {
     let current = *app.config().settings();
     let config = Config::new(configuration.onto(current)).map_err(configuration::refused)?;

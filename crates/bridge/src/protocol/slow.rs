@@ -2,7 +2,7 @@
 
 use super::frame::CRC32;
 use super::message::{Answer, Refusal, SlotContents, Slots};
-use crate::platform::Slot;
+use crate::board::Slot;
 use crate::store::{Contents, WeightsStore};
 use crc::{Digest, Table};
 

@@ -3,12 +3,15 @@
 use super::configuration::per_axis;
 use super::message::{Counters, FromBridge, GripperStatus, Health, Sample, Status};
 use super::server::Server;
-use crate::Instant;
-use crate::app::Controls;
 use crate::clutch::Position;
+use crate::{App, Board, Instant};
 
 impl<S> Server<S> {
-    pub(super) fn take_sample<A: Controls<X>, const X: usize>(&mut self, now: Instant, app: &A) {
+    pub(super) fn take_sample<B: Board<X>, const X: usize>(
+        &mut self,
+        now: Instant,
+        app: &App<B, X>,
+    ) {
         let Some(telemetry) = &mut self.telemetry else {
             return;
         };
@@ -41,17 +44,17 @@ impl<S> Server<S> {
         }));
     }
 
-    pub(super) fn health<A: Controls<X>, const X: usize>(&self, app: &A) -> Health {
+    pub(super) fn health<B: Board<X>, const X: usize>(&self, app: &App<B, X>) -> Health {
         let seen = app.telemetry();
         Health {
             clutch: app.clutch(),
             calibration: seen.calibration,
-            restart: self.board.restart,
+            restart: self.machine.restart,
             stalls: seen.counters.stalls,
         }
     }
 
-    pub(super) fn counters<A: Controls<X>, const X: usize>(&self, app: &A) -> Counters {
+    pub(super) fn counters<B: Board<X>, const X: usize>(&self, app: &App<B, X>) -> Counters {
         let seen = app.telemetry();
         let host = self.decoder.counters();
         Counters {
@@ -69,14 +72,14 @@ impl<S> Server<S> {
             faults: seen.counters.faults,
             host_frames: [host.good, host.crc, host.coding, host.oversized],
             host_malformed: self.malformed,
-            bytes_lost: self.board.bytes_lost,
-            stack_used: self.board.stack_used,
+            bytes_lost: self.machine.bytes_lost,
+            stack_used: self.machine.stack_used,
         }
     }
 }
 
 /// What the bridge is doing.
-pub(super) fn status<A: Controls<X>, const X: usize>(app: &A) -> Status {
+pub(super) fn status<B: Board<X>, const X: usize>(app: &App<B, X>) -> Status {
     let seen = app.telemetry();
     Status {
         now_us: seen.now.as_ticks(),

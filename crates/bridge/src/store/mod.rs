@@ -21,7 +21,7 @@ mod slot;
 
 pub use error::Error;
 
-use crate::platform::Slot;
+use crate::board::Slot;
 use embedded_storage::nor_flash::NorFlashError;
 use hae::image::{Checked, JointOrder, Verifier};
 use record::Record;

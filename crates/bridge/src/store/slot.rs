@@ -2,7 +2,7 @@
 
 use super::record::{self, Record};
 use super::{Contents, Error, Expected, Image, PAGE};
-use crate::platform::Slot;
+use crate::board::Slot;
 use hae::image::{self, Checked};
 
 /// Whether the store can work with this flash.

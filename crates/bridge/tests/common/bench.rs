@@ -3,7 +3,7 @@
 use super::{FIST, Flash, hand_image};
 use bridge::app::expected;
 use bridge::event::{Event, Kind};
-use bridge::{App, Config, Epoch, Instant, Platform, Settings, State, WeightsStore};
+use bridge::{App, Board, Config, Epoch, Instant, Platform, Settings, State, WeightsStore};
 use gripper::driver::ThreeFinger;
 use rig::flash::Power;
 use rig::glove::VirtualGlove;
@@ -30,7 +30,13 @@ impl Platform for Virtual {
     }
 }
 
-pub type Loop = App<Virtual, MemoryWire, ThreeFinger<MemoryWire>, Flash, 4>;
+impl Board<4> for Virtual {
+    type Glove = MemoryWire;
+    type Gripper = ThreeFinger<MemoryWire>;
+    type Flash = Flash;
+}
+
+pub type Loop = App<Virtual, 4>;
 
 /// The loop and what it is connected to.
 pub struct Bench {

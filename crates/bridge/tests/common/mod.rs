@@ -2,6 +2,7 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 
 pub mod bench;
+pub mod fuzz;
 pub mod host;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};

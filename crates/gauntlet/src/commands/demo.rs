@@ -10,6 +10,7 @@ use rig::gripper::VirtualGripper;
 use rig::pty::{Handle, PtyDevice};
 use serde_json::json;
 use trainer::algorithm::Schedule;
+use trainer::hand::Space;
 
 use super::{on_chip, simulate};
 use crate::cli::Demo;
@@ -30,7 +31,7 @@ use host::session::{InProcess, Parts};
 use host::stats::seconds;
 use host::training::model;
 use host::training::motion::Motion;
-use host::training::quality::{GREATEST_D_KNN, LEAST_OCCUPANCY, Quality};
+use host::training::quality::Quality;
 use host::training::{Outcome, Request, train};
 
 /// Reference pairs chosen one after another.
@@ -61,7 +62,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let outcome = trained(options, &motion, &tell, interrupt)?;
     let image = model::image(&outcome.model)?;
     let length = image.len();
-    let model = Model::ThreeFinger;
+    let model = options.gripper_model;
     let log = options.log.clone();
     let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
     let (devices, parts) = devices(&motion, model, image, feed, &tell, interrupt)?;
@@ -93,6 +94,7 @@ pub(super) fn trained(
 ) -> Result<Outcome> {
     let request = Request {
         motion,
+        space: Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
         schedule: Schedule::Fast,
         epochs: None,
         pairs: PAIRS,
@@ -117,17 +119,11 @@ pub(super) fn trained(
 
 /// The demo does not drive with a map that leaves out much of the gripper's range, or folds.
 fn require_good(quality: &Quality) -> Result<()> {
-    if quality.good() {
+    let Some(fault) = quality.fault() else {
         return Ok(());
-    }
-    Err(Failure::new(
-        format!(
-            "the map is not good enough to drive with: volume occupancy {:.3} (at least {LEAST_OCCUPANCY}), d-Knn {:.2} (at most {GREATEST_D_KNN})",
-            quality.volume_occupancy, quality.d_knn
-        ),
-        "another --seed, or a recording in which every finger moves over its whole range, alone and together",
-    )
-    .into())
+    };
+    let next = "another --seed, or a recording in which every finger moves over its whole range, alone and together";
+    Err(Failure::new(fault, next).into())
 }
 
 /// Starts both devices and opens the ports to them.
@@ -265,6 +261,7 @@ mod tests {
             d_knn,
             frames: 254,
             measured_on: "held-out frames".to_owned(),
+            bar: host::training::quality::Bar::of(Space::ThreeFinger),
         }
     }
 

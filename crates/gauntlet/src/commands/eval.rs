@@ -6,6 +6,7 @@ use anyhow::Result;
 use clap::{ArgGroup, Args};
 use serde_json::json;
 use trainer::data::{Matrix, require_rows, sha256};
+use trainer::hand::{Draw, Space};
 use trainer::measures::NEIGHBOURS;
 use trainer::model::Model;
 
@@ -15,9 +16,7 @@ use crate::{note, out, say};
 use host::failure::{Failure, told};
 use host::training::model;
 use host::training::motion::Motion;
-use host::training::quality::{
-    GREATEST_D_KNN, LEAST_OCCUPANCY, Measured, Quality, measuring_targets,
-};
+use host::training::quality::{Measured, Quality, TARGETS};
 use host::training::{
     domains::{matching, pairs, samples},
     sorted,
@@ -86,10 +85,12 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
     let frames = Motion::open_for_measuring(poses, &Person)?.frames();
     let held_out = held_out(&model, &frames);
     warn(held_out, poses);
+    let [_, _, axes] = model.shape();
+    let space = Space::of_axes(axes).unwrap_or(Space::ThreeFinger);
     let quality = Quality::of(
-        &model,
+        (&model, space),
         &frames,
-        &measuring_targets(options.seed),
+        &space.samples(TARGETS, options.seed, Draw::Measure),
         format!("frames of {}", poses.display()),
     );
     if options.json {
@@ -109,13 +110,15 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
     );
     say!("mean distortion    {:.3}", quality.mean_distortion);
     say!(
-        "volume occupancy   {:.3}   (good: {LEAST_OCCUPANCY} or more)",
-        quality.volume_occupancy
+        "volume occupancy   {:.3}   (good: {} or more)",
+        quality.volume_occupancy,
+        quality.bar.volume_occupancy
     );
-    say!(
-        "d-Knn              {:.3}   (good: {GREATEST_D_KNN} or less)",
-        quality.d_knn
-    );
+    let bar = quality
+        .bar
+        .d_knn
+        .map_or_else(String::new, |most| format!("   (good: {most} or less)"));
+    say!("d-Knn              {:.3}{bar}", quality.d_knn);
     say!(
         "verdict            {}",
         quality

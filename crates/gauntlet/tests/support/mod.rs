@@ -5,13 +5,14 @@ use std::io::{BufRead, BufReader, Read};
 use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdout, Command, Output, Stdio};
 use std::sync::OnceLock;
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, UNIX_EPOCH};
 
 pub mod bench;
 pub mod devices;
 pub mod lines;
 pub mod samples;
 pub mod terminal;
+pub mod told;
 
 use rustix::process::{Pid, Signal, kill_process};
 
@@ -121,31 +122,42 @@ pub fn poses_text(rows: usize) -> String {
     text
 }
 
-/// A model trained in a few epochs: good enough to move something.
+/// A model trained in a few epochs: good enough to move something. The first test of a build trains it for all, also where
+/// each has a process of its own.
 pub fn model() -> &'static Path {
-    static MODEL: OnceLock<(tempfile::TempDir, PathBuf)> = OnceLock::new();
-    &MODEL
-        .get_or_init(|| {
-            let folder = tempfile::tempdir().unwrap();
-            let poses = poses_file(folder.path(), 200);
-            let model = folder.path().join("model.safetensors");
-            let output = run(&[
-                "train",
-                "--poses",
-                poses.to_str().unwrap(),
-                "--out",
-                model.to_str().unwrap(),
-                "--schedule",
-                "short",
-                "--epochs",
-                "30",
-                "--pairs",
-                "1",
-            ]);
-            assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-            (folder, model)
-        })
-        .1
+    static MODEL: OnceLock<PathBuf> = OnceLock::new();
+    MODEL.get_or_init(|| {
+        let tool = std::fs::metadata(env!("CARGO_BIN_EXE_gauntlet")).unwrap();
+        let built = tool.modified().unwrap().duration_since(UNIX_EPOCH).unwrap();
+        let name = format!("model-{}.safetensors", built.as_nanos());
+        let kept = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
+        if !kept.exists() {
+            train_model(&kept);
+        }
+        kept
+    })
+}
+
+/// The file appears whole: another test may be about to look.
+fn train_model(kept: &Path) {
+    let folder = tempfile::tempdir_in(kept.parent().unwrap()).unwrap();
+    let poses = poses_file(folder.path(), 200);
+    let model = folder.path().join("model.safetensors");
+    let output = run(&[
+        "train",
+        "--poses",
+        poses.to_str().unwrap(),
+        "--out",
+        model.to_str().unwrap(),
+        "--schedule",
+        "short",
+        "--epochs",
+        "30",
+        "--pairs",
+        "1",
+    ]);
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    std::fs::rename(model, kept).unwrap();
 }
 
 /// Reads lines until one contains `word`; the rest is read by a thread, so that the child never waits for its reader.

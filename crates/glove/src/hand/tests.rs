@@ -2,7 +2,7 @@ use super::*;
 use nalgebra::{Matrix3, Rotation3, Vector3};
 
 extern crate std;
-use std::{format, println, string::String, vec::Vec};
+use std::{println, string::String, vec::Vec};
 
 const X: Vector3<f32> = Vector3::new(1.0, 0.0, 0.0);
 const Y: Vector3<f32> = Vector3::new(0.0, 1.0, 0.0);
@@ -267,12 +267,7 @@ fn limits_are_ordered_and_hold_the_flat_hand() {
 
 #[test]
 fn the_recorded_hand_comes_back_within_a_fifth_of_a_degree() {
-    let path = format!(
-        "{}/../../../shared/data/hand/recorded_hand_30hz.csv",
-        env!("CARGO_MANIFEST_DIR")
-    );
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: no recorded hand at {path}");
+    let Some(text) = rig::skip::shared("hand/recorded_hand_30hz.csv") else {
         return;
     };
     let frames = read_angles(&text);

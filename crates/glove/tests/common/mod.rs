@@ -3,6 +3,8 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
+pub mod fuzz;
+
 use glove::Instant;
 use glove::hand;
 use glove::scan::{Config, Frame, Scanner};

@@ -38,6 +38,11 @@ impl<const X: usize> Doing<X> {
         }
     }
 
+    /// Whether a motion goes out with it.
+    pub(super) fn carries_motion(&self) -> bool {
+        self.motion.is_some()
+    }
+
     fn request(&self, registers: u16) -> Request<'_> {
         let (address, quantity) = (STATUS, self.quantity);
         let values = self

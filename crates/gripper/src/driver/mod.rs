@@ -31,7 +31,7 @@ pub use family::{Control, Family, ThreeFingerFamily, TwoFingerFamily};
 pub use task::{Failure, Outcome, Task};
 
 use crate::registers::{Kind, three_finger::Mode, two_finger};
-use crate::{Duration, Gripper, Instant, Motion, Status, link, timing};
+use crate::{Duration, Event, Gripper, Instant, Motion, Status, link, timing};
 use cycle::Doing;
 use echo::{EchoWatch, Recent};
 use embedded_io::{Read, ReadReady, Write};
@@ -253,19 +253,24 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         }
     }
 
-    fn step(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
+    fn step(&mut self, now: Instant) -> Option<Event<X, Error>> {
         let heard = self.hear(now);
         self.note_late(now);
-        if heard.is_some() {
-            return heard;
+        match heard {
+            Some(Ok(status)) => return Some(Event::Status(status)),
+            Some(Err(error)) => return Some(Event::Failed(error)),
+            None => {}
         }
         if let Some(error) = self.overdue(now) {
-            return Some(Err(error));
+            return Some(Event::Failed(error));
         }
-        if self.doing.is_none() && now >= self.next_start && self.link.is_free(now) {
-            return self.begin(now).err().map(Err);
+        if self.doing.is_some() || now < self.next_start || !self.link.is_free(now) {
+            return None;
         }
-        None
+        match self.begin(now) {
+            Ok(()) => self.doing?.carries_motion().then_some(Event::Sent),
+            Err(error) => Some(Event::Failed(error)),
+        }
     }
 
     /// From now on an axis may follow another's position again.
@@ -347,11 +352,11 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
 impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Gripper<X> for Driver<S, F, X> {
     type Error = Error;
 
-    fn poll(&mut self, now: Instant) -> Option<Result<Status<X>, Error>> {
+    fn poll(&mut self, now: Instant) -> Option<Event<X, Error>> {
         self.note_gap(now);
-        let outcome = self.step(now);
+        let event = self.step(now);
         self.due = Some(self.next_due().max(now));
-        outcome
+        event
     }
 
     fn set_motion(&mut self, motion: Option<Motion<X>>, stamp: Instant) {

@@ -5,7 +5,7 @@ use gripper::driver::{Config, Control, Driver, Error, Failure, Family, Outcome, 
 use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::registers::three_finger::Mode;
 use gripper::registers::two_finger::{Model, Release};
-use gripper::{Activation, Contact, Duration, Fault, Gripper, Instant, Motion, Status};
+use gripper::{Activation, Contact, Duration, Event, Fault, Gripper, Instant, Motion, Status};
 use rig::gripper::{Config as Virtual, Family as VirtualFamily, VirtualGripper};
 use rig::{Clock, MemoryWire};
 
@@ -60,7 +60,7 @@ impl<F: Family<X>, const X: usize> Bench<F, X> {
         let end = self.clock.now() + limit;
         loop {
             let now = self.clock.now();
-            if let Some(outcome) = self.driver.poll(now) {
+            if let Some(outcome) = self.driver.poll(now).and_then(Event::ended) {
                 return Some(outcome);
             }
             if now >= end {

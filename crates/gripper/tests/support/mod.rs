@@ -9,7 +9,7 @@ use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use gripper::link::Link;
 use gripper::registers::{COMMAND, STATUS};
 use gripper::rtu::{Registers, Request, Response};
-use gripper::{Duration, Gripper, Instant, Status};
+use gripper::{Duration, Event, Gripper, Instant, Status};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -192,7 +192,8 @@ pub fn run_gripper<G: Gripper<X>, const X: usize>(
     device: &mut dyn FnMut(&Line, u64, &[u8]),
 ) -> Option<Result<Status<X>, G::Error>> {
     run(line, until, device, &mut |now| {
-        (gripper.poll(now), gripper.next_due())
+        let ended = gripper.poll(now).and_then(Event::ended);
+        (ended, gripper.next_due())
     })
 }
 

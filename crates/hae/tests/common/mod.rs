@@ -1,6 +1,7 @@
 //! Seeded random networks and aligned buffers for the tests of this crate.
 #![allow(dead_code)] // every test file uses its part
 
+pub mod fuzz;
 pub mod tiny;
 
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};

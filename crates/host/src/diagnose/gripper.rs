@@ -7,7 +7,7 @@ use bridge::Platform;
 use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::registers::Kind;
-use gripper::{Activation, Fault, Gripper, Status};
+use gripper::{Activation, Event, Fault, Gripper, Status};
 
 use super::answer::Came;
 use super::glove::glove_answers;
@@ -345,12 +345,12 @@ where
     while start.elapsed() < SAMPLE && !interrupt.asked() {
         let now = pc.now();
         match driver.poll(now) {
-            Some(Ok(status)) => {
+            Some(Event::Status(status)) => {
                 newest = Some(status);
                 statuses += 1;
             }
-            Some(Err(error)) => last_error = Some(error),
-            None => {}
+            Some(Event::Failed(error)) => last_error = Some(error),
+            Some(Event::Sent) | None => {}
         }
         pc.wait_until(driver.next_due().clamp(now, now + LOOK));
     }

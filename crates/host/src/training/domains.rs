@@ -175,7 +175,7 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
     };
     let answers = (truth.as_ref()).map(|pairs| sha256(&[&pairs.inputs, &pairs.targets]));
     Ok(Task {
-        is_hand: false,
+        hand: None,
         answers,
         truth: truth.map(|truth| matching(&truth, &held_out)),
         training,

@@ -5,12 +5,10 @@ use std::time::Duration;
 
 use anyhow::Result;
 use glove::hand::{JOINT_NAMES, LIMITS};
-use gripper::space;
 use trainer::algorithm::{PairPlan, Schedule};
-use trainer::cost::Lambda;
 use trainer::data::{Columns, Matrix, Pairs, Table, split};
 use trainer::hand::table3;
-use trainer::hand::{Scripted, Space, start_pairs};
+use trainer::hand::{Draw, Scripted, Space, start_pairs};
 use trainer::measures::NEIGHBOURS;
 use trainer::model::{Model, Normalisation};
 use trainer::operator::Operator;
@@ -22,9 +20,8 @@ use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::report::Reporter;
-use crate::session::record::{AXES, AXIS_NAMES};
 use crate::training::motion::{Motion, tell_notes};
-use crate::training::quality::{GRIPPER, Quality, measuring_targets, targets};
+use crate::training::quality::{Quality, TARGETS};
 
 /// Pairs where nothing else is said (§3.3.4).
 const PAIRS: usize = 8;
@@ -36,6 +33,8 @@ pub const MOST_FRAMES: usize = 1000;
 pub struct Request<'a> {
     /// The hand's motion.
     pub motion: &'a Motion,
+    /// The gripper's.
+    pub space: Space,
     /// How long.
     pub schedule: Schedule,
     /// Epochs of the last stage, instead of the schedule's.
@@ -57,7 +56,7 @@ impl Request<'_> {
 
     /// All epochs of all stages.
     pub fn total_epochs(&self) -> usize {
-        let plan = self.course().plan(AXES);
+        let plan = self.course().plan(self.space.axes());
         plan.stage_epochs * self.pairs + plan.last_epochs
     }
 }
@@ -91,7 +90,12 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
         start_pairs: request.start_pairs,
         reporter: request.reporter,
     };
-    let mut task = task(request.motion, &wanted, request.seed, 1.0 - TRAINING_SHARE)?;
+    let mut task = task(
+        (request.motion, request.space),
+        &wanted,
+        request.seed,
+        1.0 - TRAINING_SHARE,
+    )?;
     let course = request.course();
     let learned = match learn(&mut task, &course, request.reporter, interrupt)? {
         Ended::Trained(learned) => learned,
@@ -103,7 +107,7 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
     let mut model = task.model(&course, &learned);
     let measured = task.measure(&mut model, interrupt)?;
     Ok(Outcome {
-        quality: Quality::from_measured(&measured),
+        quality: Quality::from_measured(&measured, request.space),
         model,
         took: learned.took,
         epochs: learned.trained.epochs,
@@ -128,7 +132,12 @@ pub struct HandPairs<'a> {
 ///
 /// # Errors
 /// A failure that names the file and what is wrong with it.
-pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -> Result<Task> {
+pub fn task(
+    (motion, space): (&Motion, Space),
+    wanted: &HandPairs<'_>,
+    seed: u64,
+    hold_out: f64,
+) -> Result<Task> {
     let inputs = motion.frames();
     let frames = inputs.select(&spread(&inputs, MOST_FRAMES));
     if frames.rows < inputs.rows {
@@ -155,26 +164,26 @@ pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -
     } else {
         "the training frames"
     };
-    let mut operator = operator(motion, &training)?;
-    let (pairs, pairs_from) = pairs(wanted, &mut operator)?;
+    let mut operator = operator((motion, space), &training)?;
+    let (pairs, pairs_from) = pairs(wanted, space, &mut operator)?;
     let units = Units {
         q: Normalisation::identity(inputs.cols),
-        x: Normalisation::gripper(AXES),
+        x: space.units(),
     };
     Ok(Task {
         training,
         held_out,
-        targets: targets(seed),
-        measuring: measuring_targets(seed),
+        targets: space.samples(TARGETS, seed, Draw::Train),
+        measuring: space.samples(TARGETS, seed, Draw::Measure),
         truth: None,
-        coverage: GRIPPER,
-        is_hand: true,
+        coverage: space.coverage(),
+        hand: Some(space),
         answers: None,
         inputs,
         units,
         pairs,
         operator: Box::new(operator),
-        lambda: Lambda::HAND,
+        lambda: space.lambda(),
         names: &JOINT_NAMES,
         pairs_from,
         measured_on: format!("{share} of {source}"),
@@ -182,17 +191,19 @@ pub fn task(motion: &Motion, wanted: &HandPairs<'_>, seed: u64, hold_out: f64) -
 }
 
 /// Who answers for the person.
-fn operator(motion: &Motion, training: &Matrix) -> Result<Scripted> {
+fn operator((motion, space): (&Motion, Space), training: &Matrix) -> Result<Scripted> {
     match motion {
-        Motion::Generated { .. } => Ok(Scripted::new(Space::ThreeFinger, &LIMITS)),
-        Motion::Recorded { .. } => {
-            Scripted::for_recording(Space::ThreeFinger, training).map_err(told)
-        }
+        Motion::Generated { .. } => Ok(Scripted::new(space, &LIMITS)),
+        Motion::Recorded { .. } => Scripted::for_recording(space, training).map_err(told),
     }
 }
 
 /// The pairs, and in words where they come from.
-fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPlan, String)> {
+fn pairs(
+    wanted: &HandPairs<'_>,
+    space: Space,
+    operator: &mut dyn Operator,
+) -> Result<(PairPlan, String)> {
     let count = |choice: Option<PairChoice>| choice.and_then(|c| c.count).unwrap_or(PAIRS);
     let kind = match (wanted.choice, wanted.file) {
         (Some(choice), _) => choice.kind,
@@ -208,16 +219,14 @@ fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPla
             let count = wanted.choice.and_then(|choice| choice.count);
             let text = format!("of {}, all there from the start", file.display());
             Ok((
-                PairPlan::Fixed(first(from_file(file, wanted.reporter)?, count)?),
+                PairPlan::Fixed(first(from_file(file, space, wanted.reporter)?, count)?),
                 text,
             ))
         }
         PairKind::Adaptive => {
             let start = match wanted.file {
-                Some(file) => from_file(file, wanted.reporter)?,
-                None if wanted.start_pairs => {
-                    start_pairs(Space::ThreeFinger, operator).map_err(told)?
-                }
+                Some(file) => from_file(file, space, wanted.reporter)?,
+                None if wanted.start_pairs => start_pairs(space, operator).map_err(told)?,
                 None => Pairs::default(),
             };
             let plan = PairPlan::Adaptive {
@@ -232,6 +241,11 @@ fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPla
         PairKind::Table3 if wanted.file.is_some() => Err(Failure::usage(
             "--pairs table3 brings its own poses, --pairs-file others",
             "one of the two",
+        )
+        .into()),
+        PairKind::Table3 if space != Space::ThreeFinger => Err(Failure::usage(
+            "--pairs table3 are poses of the 3-Finger gripper",
+            "--pairs 8 or --pairs-file",
         )
         .into()),
         PairKind::Table3 => {
@@ -253,25 +267,31 @@ fn pairs(wanted: &HandPairs<'_>, operator: &mut dyn Operator) -> Result<(PairPla
 }
 
 /// The pairs of a file, radians and counts, targets the gripper can take.
-fn from_file(file: &Path, reporter: &dyn Reporter) -> Result<Pairs> {
-    let columns: Vec<&str> = JOINT_NAMES.iter().chain(&AXIS_NAMES).copied().collect();
+fn from_file(file: &Path, space: Space, reporter: &dyn Reporter) -> Result<Pairs> {
+    let columns: Vec<&str> = JOINT_NAMES
+        .iter()
+        .chain(space.axis_names())
+        .copied()
+        .collect();
     let mut table = Table::open(file, Columns::Named(&columns)).map_err(told)?;
-    let pairs = (table.hand_pairs(&JOINT_NAMES, &AXIS_NAMES)).map_err(told)?;
+    let pairs = (table.hand_pairs(&JOINT_NAMES, space.axis_names())).map_err(told)?;
     tell_notes(file, &table, reporter);
     for (row, target) in pairs.targets.iter_rows().enumerate() {
-        let Ok(counts) = <[f32; AXES]>::try_from(target) else {
-            continue;
-        };
-        if !space::contains(&counts) {
+        if !space.contains(target) {
+            let border = match space {
+                Space::ThreeFinger => format!(
+                    "; where the scissor is above {} finger A with B or C below {}",
+                    gripper::space::SCISSOR_LIMIT,
+                    gripper::space::SUM_LIMIT
+                ),
+                Space::OneAxis => String::new(),
+            };
             let what = format!(
-                "{}: pair {}: {counts:?} is no position of the gripper (0 to 255 an axis; where the scissor is above {} \
-                 finger A with B or C below {})",
+                "{}: pair {}: {target:?} is no position of the gripper (0 to 255 an axis{border})",
                 file.display(),
-                row + 1,
-                space::SCISSOR_LIMIT,
-                space::SUM_LIMIT
+                row + 1
             );
-            let next = format!("{:?}, the nearest one", space::nearest(&counts));
+            let next = format!("{:?}, the nearest one", space.nearest(target));
             return Err(Failure::new(what, next).into());
         }
     }

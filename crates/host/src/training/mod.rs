@@ -17,6 +17,7 @@ use anyhow::Result;
 use trainer::algorithm::{PairPlan, Plan, Schedule, Settings, Trained};
 use trainer::cost::{Cost, Lambda};
 use trainer::data::{Matrix, Pairs, sha256};
+use trainer::hand::Space;
 use trainer::measures::Coverage;
 use trainer::model::{Model, Normalisation};
 use trainer::network::{HIDDEN, Initialisation};
@@ -48,8 +49,8 @@ pub struct Task {
     /// True pairs to measure with.
     truth: Option<Pairs>,
     coverage: Coverage,
-    /// Measured as the verdict on a hand's map is.
-    is_hand: bool,
+    /// The gripper of a hand's map, which is measured as the verdict on it is.
+    hand: Option<Space>,
     /// Digest of the true pairs, which answer for reference pairs.
     answers: Option<String>,
     units: Units,
@@ -266,13 +267,12 @@ impl Task {
         let (map, held_out, targets) =
             (model.clone(), self.held_out.clone(), self.measuring.clone());
         let (coverage, truth) = (self.coverage, self.truth.clone());
-        let (is_hand, measured_on) = (self.is_hand, self.measured_on.clone());
+        let (hand, measured_on) = (self.hand, self.measured_on.clone());
         let measured = unless_asked(interrupt, move || {
             let samples = (&held_out, &targets);
-            if is_hand {
-                Measured::of_hand(&map, samples, measured_on)
-            } else {
-                Measured::of(&map, samples, &coverage, truth.as_ref(), measured_on)
+            match hand {
+                Some(space) => Measured::of_hand((&map, space), samples, measured_on),
+                None => Measured::of(&map, samples, &coverage, truth.as_ref(), measured_on),
             }
         });
         let Some(measured) = measured else {

@@ -8,11 +8,11 @@ use hae::image::{ALIGNMENT, Checked, JointOrder, Meta, Parameters};
 use hae::quantized;
 use serde::Serialize;
 use trainer::data::Matrix;
+use trainer::hand::Space;
 use trainer::model::{Model, has_digest};
 
 use crate::failure::{Failure, OrFail, told};
 use crate::report::Reporter;
-use crate::session::record::{AXES, AXIS_NAMES};
 use crate::training::motion::Motion;
 
 /// Longest file that is looked at: a weights image has some 40 KB, a model some 500 KB.
@@ -41,7 +41,8 @@ pub struct Int16 {
 impl Int16 {
     /// In one line.
     pub fn line(&self) -> String {
-        let axes = self.error_counts.iter().zip(AXIS_NAMES);
+        let space = Space::of_axes(self.error_counts.len()).unwrap_or(Space::ThreeFinger);
+        let axes = self.error_counts.iter().zip(space.axis_names());
         let errors: Vec<_> = axes
             .map(|(counts, axis)| format!("{axis} {counts:.3}"))
             .collect();
@@ -124,7 +125,7 @@ const _: () = assert!(
     "the bridge runs maps of the size that the trainer makes"
 );
 
-/// Loads a model that maps 25 joint angles to the gripper's 4 positions with as many hidden units as the bridge runs.
+/// Loads a model that maps 25 joint angles to the positions of a gripper with as many hidden units as the bridge runs.
 ///
 /// # Errors
 /// A failure that names the file and what is wrong with it.
@@ -156,8 +157,12 @@ fn parsed(bytes: &[u8], path: &Path, reporter: &dyn Reporter) -> Result<Model> {
 }
 
 fn hand(model: Model, path: &Path) -> Result<Model> {
-    model.require_shape(path, JOINT_COUNT, AXES).map_err(told)?;
-    let [_, hidden, _] = model.shape();
+    let [_, hidden, axes] = model.shape();
+    // Of no gripper: told as the 3-Finger's.
+    let space = Space::of_axes(axes).unwrap_or(Space::ThreeFinger);
+    model
+        .require_shape(path, JOINT_COUNT, space.axes())
+        .map_err(told)?;
     if hidden != bridge::HIDDEN {
         return Err(Failure::new(
             format!(

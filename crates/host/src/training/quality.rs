@@ -2,24 +2,49 @@
 
 use serde::Serialize;
 use trainer::data::{Matrix, Pairs};
-use trainer::hand::{Draw, Space};
+use trainer::hand::Space;
 use trainer::measures::{Coverage, Test, measure, occupancy};
 use trainer::model::{Model, Normalisation};
 use trainer::spread::spread;
 
-/// Least volume occupancy of a map worth driving with.
-pub const LEAST_OCCUPANCY: f64 = 0.90;
-/// Greatest d-Knn of a map without folds.
-pub const GREATEST_D_KNN: f64 = 16.0;
+/// What a map must reach to be worth driving a gripper with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bar {
+    /// Least volume occupancy.
+    pub volume_occupancy: f64,
+    /// Greatest d-Knn; beyond it the map folds. `None` for one axis: many hand poses belong to one place there, so that neighbours on
+    /// the axis are far apart as hands, whatever the map.
+    pub d_knn: Option<f64>,
+    /// A place counts as reached within this distance of an image, counts; `None`: as the paper has it (Eq. 15), by the volume of the
+    /// space and the number of poses.
+    pub within: Option<f64>,
+}
+
+impl Bar {
+    /// For a gripper with this space.
+    pub const fn of(space: Space) -> Self {
+        match space {
+            Space::ThreeFinger => Self {
+                volume_occupancy: 0.90,
+                d_knn: Some(16.0),
+                within: None,
+            },
+            Space::OneAxis => Self {
+                volume_occupancy: 0.95,
+                d_knn: None,
+                within: Some(5.0),
+            },
+        }
+    }
+}
+
 /// Hand poses that the measures of a hand's map are taken on, the farthest from one another (the paper measures on 254): volume
 /// occupancy falls with their number, and neighbours in time stand for nothing new.
 pub const MEASURED: usize = 254;
 /// Fewest of them that the volume occupancy is taken to be of: a handful of poses with balls of their own would cover the gripper.
 const LEAST_MEASURED: usize = 200;
 /// Gripper poses that stand for the whole configuration space.
-const TARGETS: usize = 8000;
-/// Counts from open to closed.
-const STROKE: f64 = 255.0;
+pub const TARGETS: usize = 8000;
 
 /// The measures of a map on hand poses it was not trained on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -34,17 +59,27 @@ pub struct Quality {
     pub frames: usize,
     /// What those poses are.
     pub measured_on: String,
+    /// What they must be.
+    #[serde(skip)]
+    pub bar: Bar,
 }
 
 impl Quality {
-    /// Measures `model` on `frames` (radians, one hand pose a row) against `targets` (counts).
-    pub fn of(model: &Model, frames: &Matrix, targets: &Matrix, measured_on: String) -> Self {
-        Self::from_measured(&Measured::of_hand(model, (frames, targets), measured_on))
+    /// Measures the map of a hand to a gripper with `space` on `frames` (radians, one hand pose a row) against `targets` (counts).
+    pub fn of(
+        (model, space): (&Model, Space),
+        frames: &Matrix,
+        targets: &Matrix,
+        measured_on: String,
+    ) -> Self {
+        let measured = Measured::of_hand((model, space), (frames, targets), measured_on);
+        Self::from_measured(&measured, space)
     }
 
     /// Of measures whose occupancy is known.
-    pub fn from_measured(measured: &Measured) -> Self {
+    pub fn from_measured(measured: &Measured, space: Space) -> Self {
         Self {
+            bar: Bar::of(space),
             mean_distortion: measured.mean_distortion,
             volume_occupancy: measured.volume_occupancy.unwrap_or(0.0),
             d_knn: measured.d_knn,
@@ -55,7 +90,11 @@ impl Quality {
 
     /// Whether the map is worth driving with. A measure that is no number is not.
     pub fn good(&self) -> bool {
-        self.volume_occupancy >= LEAST_OCCUPANCY && self.d_knn <= GREATEST_D_KNN
+        let folds = self
+            .bar
+            .d_knn
+            .is_some_and(|most| self.d_knn > most || self.d_knn.is_nan());
+        self.volume_occupancy >= self.bar.volume_occupancy && !folds
     }
 
     /// Why the map is not worth driving with; `None` when it is.
@@ -71,10 +110,13 @@ impl Quality {
         } else {
             String::new()
         };
+        let folds = match self.bar.d_knn {
+            Some(most) => format!(", d-Knn {:.2} (at most {most})", self.d_knn),
+            None => String::new(),
+        };
         Some(format!(
-            "the map is not good enough to drive with: volume occupancy {:.3} (at least {LEAST_OCCUPANCY}), d-Knn {:.2} (at most \
-             {GREATEST_D_KNN}){few}",
-            self.volume_occupancy, self.d_knn
+            "the map is not good enough to drive with: volume occupancy {:.3} (at least {}){folds}{few}",
+            self.volume_occupancy, self.bar.volume_occupancy
         ))
     }
 
@@ -86,12 +128,6 @@ impl Quality {
         )
     }
 }
-
-/// The gripper's configuration space, counts.
-pub const GRIPPER: Coverage = Coverage::Volume {
-    volume: gripper::space::VOLUME_FRACTION as f64 * STROKE * STROKE * STROKE * STROKE,
-    dimension: 4,
-};
 
 /// The four measures of a map between any two domains.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -119,7 +155,7 @@ impl Measured {
     /// Measures the map of a hand on [`MEASURED`] of the frames, spread by distance, or on all where there are fewer: so that what is
     /// measured does not depend on how often a motion was sampled.
     pub fn of_hand(
-        model: &Model,
+        (model, space): (&Model, Space),
         (frames, targets): (&Matrix, &Matrix),
         measured_on: String,
     ) -> Self {
@@ -130,9 +166,13 @@ impl Measured {
             measured_on
         };
         let counted = spread.rows.max(LEAST_MEASURED);
-        let coverage = GRIPPER
-            .epsilon(counted)
-            .map_or(Coverage::Unknown, Coverage::Epsilon);
+        let coverage = match Bar::of(space).within {
+            Some(counts) => Coverage::Epsilon(counts * counts),
+            None => space
+                .coverage()
+                .epsilon(counted)
+                .map_or(Coverage::Unknown, Coverage::Epsilon),
+        };
         Self::of(model, (&spread, targets), &coverage, None, measured_on)
     }
 
@@ -222,43 +262,15 @@ fn uniform_scale(units: &Normalisation) -> Option<f64> {
     uniform.then_some(f64::from(first))
 }
 
-/// Gripper poses spread evenly over the configuration space, counts: those to train on.
-pub fn targets(seed: u64) -> Matrix {
-    poses(seed, Draw::Train)
-}
-
-/// Others of the same kind, to measure with.
-pub fn measuring_targets(seed: u64) -> Matrix {
-    poses(seed, Draw::Measure)
-}
-
-fn poses(seed: u64, draw: Draw) -> Matrix {
-    Space::ThreeFinger.samples(TARGETS, seed, draw)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use trainer::hand::Draw;
 
-    #[test]
-    fn the_gripper_s_normalisation_gives_the_paper_s_volume() {
-        let scale = uniform_scale(&Normalisation::gripper(4)).unwrap();
-        let found = GRIPPER.epsilon(254).unwrap() / (scale * scale);
-        let expected = Coverage::GRIPPER.epsilon(254);
-        assert!((found / expected.unwrap() - 1.0).abs() < 1e-5);
-    }
+    const SPACE: Space = Space::ThreeFinger;
 
-    #[test]
-    fn targets_lie_in_the_configuration_space_and_follow_from_the_seed() {
-        let all = targets(3);
-        assert_eq!((all.rows, all.cols), (TARGETS, 4));
-        assert!(all.iter_rows().all(|row| {
-            let row: [f32; 4] = row.try_into().unwrap();
-            gripper::space::contains(&row)
-        }));
-        assert_eq!(all, targets(3));
-        assert_ne!(all, targets(4));
-        assert_ne!(all, measuring_targets(3));
+    fn measuring_targets(seed: u64) -> Matrix {
+        SPACE.samples(TARGETS, seed, Draw::Measure)
     }
 
     /// Sums of two angles each: smooth, without folds.
@@ -297,7 +309,7 @@ mod tests {
     fn the_same_motion_sampled_more_often_has_the_same_measures() {
         let of = |rate| {
             Quality::of(
-                &smooth(),
+                (&smooth(), SPACE),
                 &motion(rate),
                 &measuring_targets(1),
                 String::new(),
@@ -325,17 +337,53 @@ mod tests {
         let every = |step: usize| frames.select(&(0..1200).step_by(step).collect::<Vec<_>>());
         for step in [5, 6] {
             let some = every(step);
-            let ours = Measured::of_hand(&model, (&some, &targets), String::new());
-            let paper = Measured::of(&model, (&some, &targets), &GRIPPER, None, String::new());
+            let ours = Measured::of_hand((&model, SPACE), (&some, &targets), String::new());
+            let paper = Measured::of(
+                &model,
+                (&some, &targets),
+                &SPACE.coverage(),
+                None,
+                String::new(),
+            );
             assert_eq!(ours, paper, "{} frames", some.rows);
         }
         let few = every(60);
-        let ours = Measured::of_hand(&model, (&few, &targets), String::new());
-        let paper = Measured::of(&model, (&few, &targets), &GRIPPER, None, String::new());
+        let ours = Measured::of_hand((&model, SPACE), (&few, &targets), String::new());
+        let paper = Measured::of(
+            &model,
+            (&few, &targets),
+            &SPACE.coverage(),
+            None,
+            String::new(),
+        );
         let [ours_vo, paper_vo] = [&ours, &paper].map(|m| m.volume_occupancy.unwrap());
         assert!(ours_vo < 0.7 * paper_vo, "{ours_vo} {paper_vo}");
-        let fault = Quality::from_measured(&ours).fault().unwrap();
+        let fault = Quality::from_measured(&ours, SPACE).fault().unwrap();
         assert!(fault.contains("20 poses are few"), "{fault}");
+    }
+
+    #[test]
+    fn a_map_to_one_axis_is_good_where_every_place_is_reached_and_not_where_one_end_is_missing() {
+        // The curl of one joint over its range of 1.4 rad, all of it or nine tenths.
+        let curl = |share: f32| {
+            let mut f = trainer::network::Network::zeros(25, 4, 1);
+            (f.w1[5], f.w2[0], f.b2[0]) = (1.0, share, -0.7);
+            Model {
+                g: trainer::network::Network::zeros(1, 4, 25),
+                f,
+                q: Normalisation::identity(25),
+                x: Space::OneAxis.units(),
+                metadata: Default::default(),
+            }
+        };
+        let targets = Space::OneAxis.samples(TARGETS, 1, Draw::Measure);
+        let of = |model: &Model| {
+            let space = (model, Space::OneAxis);
+            Quality::of(space, &motion(30), &targets, String::new())
+        };
+        let (whole, part) = (of(&curl(1.0)), of(&curl(0.9)));
+        assert!(whole.good(), "{whole:?}");
+        assert!(!part.good() && part.volume_occupancy < 0.93, "{part:?}");
     }
 
     #[test]
@@ -346,6 +394,7 @@ mod tests {
             d_knn: f64::NAN,
             frames: 1,
             measured_on: String::new(),
+            bar: Bar::of(SPACE),
         };
         assert!(!quality.good());
     }

@@ -6,6 +6,11 @@ use std::path::Path;
 
 /// The longest file of samples: some million rows.
 pub(super) const LONGEST: u64 = 256 << 20;
+/// Most fields of a header: as many inputs and outputs as a map can have, and as much again. More is no table of samples, and
+/// would take its time by the square.
+const FIELDS: usize = 16_384;
+/// Longest line: so many fields of 64 bytes.
+const LONGEST_LINE: usize = FIELDS * 64;
 /// Lines in which the header is looked for.
 const HEADER_WITHIN: usize = 500;
 
@@ -66,6 +71,15 @@ impl Sheet {
     pub fn read(bytes: &[u8], file: &Path, wanted: &dyn Fn(&Name) -> bool) -> Result<Self, Error> {
         let text = decode(bytes, file)?;
         let lines: Vec<&str> = text.lines().collect();
+        let not_csv = |place: usize, what: String| Error::NotCsv {
+            file: file.to_owned(),
+            line: place as u64 + 1,
+            what,
+        };
+        if let Some(place) = lines.iter().position(|line| line.len() > LONGEST_LINE) {
+            let bytes = lines[place].len();
+            return Err(not_csv(place, format!("a line of {bytes} bytes")));
+        }
         let Some((place, separator)) = find_header(&lines, wanted) else {
             return Err(Error::Empty {
                 file: file.to_owned(),
@@ -82,6 +96,10 @@ impl Sheet {
             notes.push(format!("{} stand between the fields", separator.name()));
         }
         let header = separator.fields(lines[place]);
+        if header.len() > FIELDS {
+            let what = format!("a header of {} fields, more than {FIELDS}", header.len());
+            return Err(not_csv(place, what));
+        }
         if is_data(&header) {
             return Err(Error::NoHeader {
                 file: file.to_owned(),

@@ -108,7 +108,7 @@ fn times(
     let mut offset = 0.0;
     for &row in &kept {
         let time = seconds(written[row]);
-        if starts.contains(&row) {
+        if starts.binary_search(&row).is_ok() {
             let end = time_s.last().copied().unwrap_or(0.0);
             offset = end + BETWEEN_CLIPS_S - time;
         }
@@ -173,7 +173,7 @@ fn order(
             kept.push(row);
             continue;
         };
-        let told = clip_of(row) != clip_of(before) || table.joints.contains(&row);
+        let told = clip_of(row) != clip_of(before) || table.joints.binary_search(&row).is_ok();
         if written[row] <= written[before] {
             if told {
                 starts.push(row);
@@ -190,7 +190,7 @@ fn order(
     }
     // A few rows between two steps back are rows out of order, not clips.
     for &row in &untold {
-        let at = starts.iter().position(|start| *start == row).unwrap_or(0);
+        let at = starts.binary_search(&row).unwrap_or(0);
         let from = if at == 0 { 0 } else { starts[at - 1] };
         let to = starts.get(at + 1).copied().unwrap_or(written.len());
         if row - from < ENOUGH || to - row < ENOUGH {

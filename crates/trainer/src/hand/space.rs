@@ -1,5 +1,6 @@
 //! Where a gripper can be: what a hand's map is trained to reach, by the gripper's axes.
 
+use crate::cost::Lambda;
 use crate::data::Matrix;
 use crate::measures::Coverage;
 use crate::model::Normalisation;
@@ -114,6 +115,19 @@ impl Space {
     #[must_use]
     pub fn units(self) -> Normalisation {
         Normalisation::gripper(self.axes())
+    }
+
+    /// The factors of the cost: the paper's for hands, and five times the weight of the pairs for one axis, whose two ends would else be
+    /// some counts short.
+    #[must_use]
+    pub const fn lambda(self) -> Lambda {
+        match self {
+            Self::ThreeFinger => Lambda::HAND,
+            Self::OneAxis => Lambda {
+                pin: 5.0 * Lambda::HAND.pin,
+                ..Lambda::HAND
+            },
+        }
     }
 
     /// For the volume occupancy, in counts.

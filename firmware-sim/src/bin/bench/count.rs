@@ -7,7 +7,7 @@ use super::replay::{AXES, Machine, Replay, Tape, scanner};
 use bridge::gripper::driver::ThreeFinger;
 use bridge::gripper::link::Counters;
 use bridge::gripper::registers::Fault;
-use bridge::gripper::{Activation, Contact, Gripper, Motion, Status};
+use bridge::gripper::{Activation, Contact, Event, Gripper, Motion, Status};
 use bridge::hae::Map;
 use bridge::hae::image::Verifier;
 use bridge::posture::Posture;
@@ -178,22 +178,22 @@ struct Counted<'c, R> {
 impl<const X: usize, R: Gripper<X>> Gripper<X> for Counted<'_, R> {
     type Error = R::Error;
 
-    fn poll(&mut self, now: Instant) -> Option<Result<Status<X>, Self::Error>> {
+    fn poll(&mut self, now: Instant) -> Option<Event<X, Self::Error>> {
         // SysTick is in use by the count of the whole step around this: read it, not set it.
         let sent = self.inner.counters().requests;
         let start = cortex_m::peripheral::SYST::get_current();
-        let result = self.inner.poll(now);
+        let event = self.inner.poll(now);
         let end = cortex_m::peripheral::SYST::get_current();
         let instructions = (start.wrapping_sub(end) & 0x00ff_ffff) * 10 / 16;
-        let kind = match &result {
-            Some(Ok(_)) => self.reply,
+        let kind = match &event {
+            Some(Event::Status(_)) => self.reply,
             _ if self.inner.counters().requests != sent => self.request,
-            _ => return result,
+            _ => return event,
         };
         let mut most = kind.get();
         most.see(instructions);
         kind.set(most);
-        result
+        event
     }
 
     fn set_motion(&mut self, motion: Option<Motion<X>>, stamp: Instant) {

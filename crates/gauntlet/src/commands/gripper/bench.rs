@@ -6,7 +6,7 @@ use std::time::Duration;
 use gripper::driver::{Control, Outcome, Task, ThreeFinger, TwoFinger};
 use gripper::registers::{three_finger, two_finger};
 use gripper::travel::Speed;
-use gripper::{Gripper, Status, link};
+use gripper::{Event, Gripper, Status, link};
 
 use host::clock::Clock;
 use host::clock::ticks;
@@ -217,7 +217,7 @@ impl Waiter {
             let passed = now.as_ticks().saturating_sub(looked.as_ticks());
             looked = now;
             left = left.saturating_sub(passed.min(STALL.as_ticks()));
-            let heard = driver.poll(now);
+            let heard = driver.poll(now).and_then(Event::ended);
             if let ControlFlow::Break(value) = step(driver, now, heard) {
                 return Some(value);
             }

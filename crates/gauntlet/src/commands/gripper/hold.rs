@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use gripper::travel::Verdict;
-use gripper::{Contact, Gripper};
+use gripper::{Contact, Event, Gripper};
 
 use super::Doing;
 use super::bench::Bench;
@@ -32,7 +32,7 @@ impl<const X: usize> Leader<'_, X> {
             let motion = told.map(|position| self.motion(position));
             doing.driver.set_motion(motion, now);
             // Whatever it says: the time is bounded, and there is nothing else to do.
-            if let Some(Ok(status)) = Gripper::poll(&mut doing.driver, now) {
+            if let Some(Event::Status(status)) = Gripper::poll(&mut doing.driver, now) {
                 let verdict = self.judge.take(&status, now);
                 let assured = self.assurance.take(&status, verdict);
                 if assured && matches!(verdict, Verdict::Used { .. }) {

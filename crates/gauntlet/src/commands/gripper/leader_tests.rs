@@ -7,7 +7,7 @@ use crate::tell::Tell;
 use gripper::driver::{Control, Outcome, Task};
 use gripper::registers::three_finger;
 use gripper::travel::Speed;
-use gripper::{Contact, Gripper};
+use gripper::{Contact, Event, Gripper};
 use host::clock::Clock;
 use host::interrupt::Interrupt;
 use host::lines::Model;
@@ -45,7 +45,7 @@ impl<F: FnMut(u64, u8) -> u8> Scripted<F> {
 
 impl<F: FnMut(u64, u8) -> u8> Gripper<1> for Scripted<F> {
     type Error = gripper::Error;
-    fn poll(&mut self, now: Instant) -> Option<Result<Status<1>, gripper::Error>> {
+    fn poll(&mut self, now: Instant) -> Option<Event<1, gripper::Error>> {
         let at = now.as_ticks();
         if at < self.next {
             return None;
@@ -59,7 +59,7 @@ impl<F: FnMut(u64, u8) -> u8> Gripper<1> for Scripted<F> {
         // Some 150 counts a second.
         let way = f32::from(self.told) - self.truth;
         self.truth += way.clamp(-1.2, 1.2);
-        Some(Ok(Status {
+        Some(Event::Status(Status {
             stamp: Instant::from_ticks(at - 6_000),
             activation: Activation::Ready,
             going_to: true,
@@ -144,7 +144,8 @@ fn moved<F: FnMut(u64, u8) -> u8>(
         force: 64,
     };
     let mut driver = Scripted::new(30.0, shown);
-    let first = driver.poll(Instant::from_ticks(CYCLE)).unwrap().unwrap();
+    let first = driver.poll(Instant::from_ticks(CYCLE));
+    let first = first.and_then(Event::ended).unwrap().unwrap();
     let doing = Doing {
         driver: Scripted::new(30.0, |_, truth| truth),
         target: &options.target,
@@ -168,7 +169,7 @@ fn moved<F: FnMut(u64, u8) -> u8>(
             pause = pauses.next();
         }
         let now = Instant::from_ticks(us);
-        let heard = driver.poll(now);
+        let heard = driver.poll(now).and_then(Event::ended);
         if let Some(end) = leader.step(&mut driver, now, heard) {
             return (Some(end), driver);
         }

@@ -3,7 +3,10 @@
 use std::path::PathBuf;
 
 use clap::{ArgGroup, Args, ValueEnum};
+use host::lines::Model;
 use host::training::PairChoice;
+
+use crate::commands::gripper::model_parser;
 use trainer::cost::Cost;
 use trainer::measures::Coverage;
 
@@ -30,6 +33,9 @@ pub struct Train {
     /// The hand poses to train on.
     #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["target", "truth", "normalise", "force", "hidden", "epsilon", "volume", "dim"])]
     pub poses: Option<PathBuf>,
+    /// The gripper that the hand will move.
+    #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f", conflicts_with = "input")]
+    pub gripper_model: Model,
     /// Samples of the input domain, columns q0, q1, …
     #[arg(long, value_name = "Q.csv", requires = "target")]
     pub input: Option<PathBuf>,

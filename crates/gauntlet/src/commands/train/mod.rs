@@ -8,6 +8,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use serde_json::{Value, json};
+use trainer::hand::Space;
 use trainer::hand::table3::POSES;
 use trainer::model::Model;
 use trainer::network::Initialisation;
@@ -50,7 +51,7 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     // The whole file with its measures; the one without is there whatever becomes of it.
     model.save(&options.out).map_err(told)?;
     let is_hand = options.poses.is_some();
-    let quality = Quality::from_measured(&measured);
+    let quality = Quality::from_measured(&measured, space(options));
     let unfit = if is_hand { unfit(&quality) } else { None };
     for warning in far_from_truth(&measured).into_iter().chain(unfit) {
         out::note(format_args!("warning: {warning}"));
@@ -85,6 +86,11 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     Ok(())
 }
 
+/// Where the gripper that the hand will move can be.
+fn space(options: &Train) -> Space {
+    Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger)
+}
+
 /// What to train on, read and told.
 fn task(options: &Train, tell: &Tell) -> Result<Task> {
     match (&options.poses, &options.input, &options.target) {
@@ -92,7 +98,12 @@ fn task(options: &Train, tell: &Tell) -> Result<Task> {
             let motion = Motion::open_for_training(Some(poses), options.seed, &Person)?;
             tell.say(format_args!("poses      {}", motion.describe()));
             let pairs = hand_pairs(options);
-            hand::task(&motion, &pairs, options.seed, options.hold_out)
+            hand::task(
+                (&motion, space(options)),
+                &pairs,
+                options.seed,
+                options.hold_out,
+            )
         }
         (_, Some(input), Some(target)) => {
             let task = domains::task(&domain_files(options, input, target))?;

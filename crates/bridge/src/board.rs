@@ -1,7 +1,9 @@
-//! What the bridge needs from the machine it runs on.
+//! What the bridge needs from its home: a microcontroller's board, a PC, or a test's virtual clock.
 
 use crate::Instant;
+use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
+use gripper::Gripper;
 
 /// The clock, and a way to sleep.
 pub trait Platform {
@@ -10,6 +12,20 @@ pub trait Platform {
 
     /// Sleeps until `due`, or until a port has bytes or room again, whichever comes first. Waking early is always right.
     fn wait_until(&mut self, due: Instant);
+}
+
+/// A home of the bridge: its clock, and the kind of each device that is connected to it. `X` is the gripper's number of
+/// axes; a machine can be a board for several.
+///
+/// A board is one value with the clock ([`Platform`]); the devices themselves are handed to [`crate::App::new`], which
+/// owns them from then on.
+pub trait Board<const X: usize>: Platform {
+    /// The port of the glove's serial multiplexer. Its reads and writes never wait.
+    type Glove: Read + ReadReady + Write;
+    /// The gripper, whatever line it is on.
+    type Gripper: Gripper<X>;
+    /// A slot of the weights store.
+    type Flash: Slot;
 }
 
 /// One of the two places a weights image can live in: flash of its own, which can also be read as memory.

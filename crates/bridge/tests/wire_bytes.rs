@@ -1,0 +1,454 @@
+//! The bytes of every message of the host protocol, version 3, held against a file: what stands inside may change, what is
+//! on the wire may not.
+
+use bridge::calibration::{CalibrationState, Refusal as NotTaken, Try};
+use bridge::clutch::{HeartbeatRefusal, Position};
+use bridge::glove::hand::Side;
+use bridge::gripper::{Activation, registers::Fault};
+use bridge::hae::image::{self, JointOrder};
+use bridge::protocol::frame;
+use bridge::protocol::message::{
+    Answer, Call, Configuration, Counters, FromBridge, GripperStatus, Health, Hello, Refusal,
+    Reply, Request, Restart, Sample, SlotContents, Slots, Status, VERSION, WeightsKind,
+};
+use bridge::{GripperFault, HoldReason, SafeAction, State, filter, store};
+use embedded_storage::nor_flash::NorFlashErrorKind;
+use std::fmt::Write;
+
+/// One line a message: requests, then replies, then samples.
+const GOLDEN: &str = include_str!("golden/host-protocol-3.txt");
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().fold(String::new(), |mut text, byte| {
+        write!(text, "{byte:02x}").expect("a string takes all");
+        text
+    })
+}
+
+fn calls() -> Vec<Call<'static>> {
+    vec![
+        Call::Hello { version: VERSION },
+        Call::Status,
+        Call::Counters,
+        Call::Slots,
+        Call::WeightsBegin {
+            length: 36_700,
+            crc: 0x1234_5678,
+        },
+        Call::WeightsChunk {
+            offset: 512,
+            bytes: &[1, 2, 0, 255],
+        },
+        Call::WeightsCommit,
+        Call::WeightsAbort,
+        Call::SelectSlot { slot: 1 },
+        Call::ConfigurationGet,
+        Call::ConfigurationSet(configuration(Side::Left, SafeAction::OpenSlowly)),
+        Call::Engage,
+        Call::Release,
+        Call::Activate,
+        Call::CalibrateFlatHand,
+        Call::Telemetry { period_ms: 300 },
+        Call::Reboot,
+        Call::Heartbeat { epoch: 70_000 },
+        Call::CalibrateUndo,
+        Call::Health,
+    ]
+}
+
+fn configuration(side: Side, safe_action: SafeAction) -> Configuration {
+    Configuration {
+        side,
+        filter: filter::Settings {
+            min_cutoff: 1.5,
+            beta: 0.25,
+            derivative_cutoff: 3.0,
+        },
+        fresh_frames: 7,
+        blend_ms: 1_200,
+        rate: 333.0,
+        lead: 21,
+        safe_action,
+        open_rate: 44.0,
+        speed: [1, 2, 3, 4].into_iter().collect(),
+        force: [5, 6].into_iter().collect(),
+        heading_is_relative: true,
+    }
+}
+
+fn activations() -> [Activation; 4] {
+    [
+        Activation::Reset,
+        Activation::Activating,
+        Activation::ChangingMode,
+        Activation::Ready,
+    ]
+}
+
+fn faults() -> [Fault; 16] {
+    [
+        Fault::None,
+        Fault::ActivationNeeded,
+        Fault::ModeChangeNeeded,
+        Fault::NotActivated,
+        Fault::OverTemperature,
+        Fault::ChipNotReady,
+        Fault::NoCommunication,
+        Fault::Interference,
+        Fault::UnderVoltage,
+        Fault::Releasing,
+        Fault::Internal,
+        Fault::Activation,
+        Fault::InterferenceLasting,
+        Fault::OverCurrent,
+        Fault::Released,
+        Fault::Unknown(3),
+    ]
+}
+
+fn reasons() -> Vec<HoldReason> {
+    let mut all = vec![
+        HoldReason::HeartbeatLost,
+        HoldReason::Settling,
+        HoldReason::SamplesStale,
+        HoldReason::SensorsLost(0x8101),
+        HoldReason::NoWeights,
+        HoldReason::StoreBusy,
+        HoldReason::InputRefused,
+        HoldReason::OutputRefused,
+        HoldReason::GripperSilent,
+    ];
+    all.extend(activations().map(HoldReason::GripperNotReady));
+    all.extend([HoldReason::ClockGap, HoldReason::NotCalibrated]);
+    all
+}
+
+fn states() -> Vec<State> {
+    let mut all = vec![State::Idle, State::Blending, State::Following];
+    all.extend(reasons().into_iter().map(State::Holding));
+    all.push(State::SafeAction(HoldReason::SamplesStale));
+    all.extend(faults().map(|fault| State::Faulted(GripperFault::Reported(fault))));
+    all.extend(activations().map(|to| State::Faulted(GripperFault::ActivationLost(to))));
+    all.push(State::Faulted(GripperFault::CommandIgnored));
+    all.push(State::Faulted(GripperFault::Implausible { axis: 3 }));
+    all
+}
+
+fn status(state: State, gripper: Option<GripperStatus>) -> Status {
+    Status {
+        now_us: 12_345_678_901,
+        state,
+        engaged: true,
+        heartbeat: false,
+        glove_answers: true,
+        gripper,
+        active_slot: Some(1),
+        transfer: Some((512, 36_700)),
+    }
+}
+
+fn image_errors() -> Vec<image::Error> {
+    let (found, expected, needed) = (300, 7, 9);
+    let (order, shape) = (JointOrder::Hand25, [25, 300, 4]);
+    vec![
+        image::Error::Truncated { found, needed },
+        image::Error::TrailingBytes { found, expected },
+        image::Error::Alignment { offset: 4 },
+        image::Error::Magic {
+            found: *b"notimage",
+        },
+        image::Error::Format { found: 300 },
+        image::Error::HeaderLength { found: 301 },
+        image::Error::Element { found: 302 },
+        image::Error::JointOrder { found: 303 },
+        image::Error::JointOrderInputs { order, inputs: 24 },
+        image::Error::Shape { found: shape },
+        image::Error::Length { found, expected },
+        image::Error::Crc {
+            found: 1,
+            computed: 2,
+        },
+        image::Error::Reserved { offset: 46 },
+        image::Error::NotFinite { at: 1_000 },
+        image::Error::Overflow,
+        image::Error::WrongShape {
+            found: shape,
+            expected: [25, 300, 1],
+        },
+        image::Error::WrongJointOrder {
+            found: JointOrder::Columns,
+            expected: order,
+        },
+        image::Error::ParameterLength {
+            name: "",
+            found,
+            expected,
+        },
+        image::Error::Buffer { found, needed },
+        image::Error::PoseRange { at: 5, value: 7.5 },
+    ]
+}
+
+fn store_errors() -> Vec<store::Error> {
+    let (slot, offset, found, expected) = (1, 4_096, 300, 512);
+    let mut all = vec![
+        store::Error::Geometry {
+            slot,
+            write_size: 3,
+            erase_size: 4_096,
+            capacity: 65_536,
+        },
+        store::Error::Engaged,
+        store::Error::NotBegun,
+        store::Error::Busy,
+        store::Error::TooLong {
+            length: 100_000,
+            capacity: 65_536,
+        },
+        store::Error::Offset { found, expected },
+        store::Error::Overrun {
+            end: 600,
+            length: 512,
+        },
+        store::Error::Incomplete { found, expected },
+        store::Error::Length { found, expected },
+        store::Error::Shape {
+            found: [25, 300, 1],
+            expected: [25, 300, 4],
+        },
+        store::Error::JointOrder {
+            found: JointOrder::Columns,
+            expected: JointOrder::Hand25,
+        },
+        store::Error::Older {
+            found: 3,
+            active: 400,
+        },
+        store::Error::ReadBack { slot, offset },
+        store::Error::NoImage { slot },
+        store::Error::NoSlot { slot: 2 },
+        store::Error::RecordsFull { slot },
+    ];
+    all.extend(
+        [
+            NorFlashErrorKind::NotAligned,
+            NorFlashErrorKind::OutOfBounds,
+            NorFlashErrorKind::Other,
+        ]
+        .map(|kind| store::Error::Flash { slot, offset, kind }),
+    );
+    all.extend(image_errors().into_iter().map(store::Error::Image));
+    all
+}
+
+fn refusals() -> Vec<Refusal> {
+    let mut all = vec![
+        Refusal::Version { bridge: VERSION },
+        Refusal::NoSession,
+        Refusal::Busy { session: 70_000 },
+        Refusal::Engaged,
+        Refusal::Configuration {
+            key: 5,
+            value: 1.0,
+            least: 10.0,
+            greatest: 2_000.0,
+        },
+        Refusal::Period { least_ms: 20 },
+        Refusal::Heartbeat(HeartbeatRefusal::Open),
+        Refusal::Heartbeat(HeartbeatRefusal::Expired),
+        Refusal::Heartbeat(HeartbeatRefusal::OldEpoch { newest: 70_000 }),
+    ];
+    all.extend(store_errors().into_iter().map(Refusal::Store));
+    all
+}
+
+fn health() -> Vec<Health> {
+    let health = |clutch, newest, restart| Health {
+        clutch,
+        calibration: CalibrationState {
+            is_calibrated: true,
+            newest,
+            ended: 300,
+        },
+        restart,
+        stalls: 400,
+    };
+    let refused = [
+        NotTaken::Engaged,
+        NotTaken::NoFrames,
+        NotTaken::Missing(0x8001),
+        NotTaken::Moving {
+            segment: 4,
+            by: 0.5,
+        },
+        NotTaken::Bent {
+            joint: 24,
+            by: 0.25,
+        },
+        NotTaken::TooShort { still_ms: 900 },
+        NotTaken::NothingBefore,
+    ];
+    let mut all = vec![
+        health(Position::Open, Try::None, Restart::Unknown),
+        health(Position::Closed, Try::Waiting, Restart::Power),
+        health(Position::Lost, Try::Taken, Restart::Software),
+        health(Position::Expired, Try::Undone, Restart::Watchdog),
+    ];
+    all.extend(refused.map(|why| health(Position::Open, Try::Refused(why), Restart::Power)));
+    all
+}
+
+fn counters() -> Counters {
+    Counters {
+        frames: 1_000_001,
+        following_frames: 2,
+        answered_frames: 3,
+        unusable_frames: 4,
+        commands: 5,
+        statuses: 6,
+        gripper_errors: 7,
+        steps: 8,
+        late_steps: 9,
+        worst_late_us: 10,
+        holds: 11,
+        faults: 12,
+        host_frames: [13, 14, 15, 16],
+        host_malformed: 17,
+        bytes_lost: [18, 19, 20],
+        stack_used: 21,
+    }
+}
+
+fn answers() -> Vec<Answer> {
+    let gripper = |activation, fault| GripperStatus {
+        activation,
+        fault,
+        echo: [9, 8, 7, 6].into_iter().collect(),
+        position: [5].into_iter().collect(),
+    };
+    let kinds = [WeightsKind::Float32, WeightsKind::Int16, WeightsKind::Other];
+    let image = |weights| SlotContents::Image {
+        model_id: 0xABCD_0123,
+        version: 7,
+        length: 36_700,
+        crc: 0x1234_5678,
+        weights,
+    };
+    let mut all = vec![
+        Answer::Done,
+        Answer::Hello(Hello {
+            version: VERSION,
+            shape: [25, 300, 4],
+            joint_order: 1,
+            capacity: 61_440,
+            chunk: 512,
+        }),
+        Answer::Counters(counters()),
+        Answer::Slots(Slots {
+            active: None,
+            contents: [SlotContents::Empty, SlotContents::Damaged],
+        }),
+        Answer::Received { bytes: 1_024 },
+        Answer::Configuration(configuration(Side::Right, SafeAction::Hold)),
+        Answer::Engaged {
+            epoch: 70_000,
+            status: status(State::Blending, None),
+        },
+    ];
+    all.extend(kinds.map(|kind| {
+        Answer::Slots(Slots {
+            active: Some(1),
+            contents: [image(kind), SlotContents::Empty],
+        })
+    }));
+    all.extend(
+        states()
+            .into_iter()
+            .map(|state| Answer::Status(status(state, None))),
+    );
+    all.extend(activations().map(|activation| {
+        Answer::Status(status(State::Idle, Some(gripper(activation, Fault::None))))
+    }));
+    all.extend(
+        faults().map(|fault| {
+            Answer::Status(status(State::Idle, Some(gripper(Activation::Ready, fault))))
+        }),
+    );
+    all.extend(health().into_iter().map(Answer::Health));
+    all
+}
+
+fn samples() -> Vec<Sample> {
+    let sample = |state| Sample {
+        now_us: 1_000_000,
+        state,
+        frame_sequence: 500,
+        angles: core::array::from_fn(|joint| joint as f32 / 8.0),
+        target: [1.5, 2.5, 3.5, 4.5].into_iter().collect(),
+        command: [1, 2, 3, 4].into_iter().collect(),
+        position: [5, 6, 7, 8].into_iter().collect(),
+        latency_us: Some(4_321),
+    };
+    let empty = Sample {
+        target: Default::default(),
+        command: Default::default(),
+        position: Default::default(),
+        latency_us: None,
+        ..sample(State::Idle)
+    };
+    let mut all = vec![empty];
+    all.extend(states().into_iter().map(sample));
+    all
+}
+
+/// Every message as the lines of the golden file; each is read back from its bytes on the way.
+fn lines() -> Vec<String> {
+    let mut text = Vec::new();
+    let mut room = [0; frame::MAX_MESSAGE];
+    for call in calls() {
+        let request = Request {
+            session: 7,
+            sequence: 300,
+            call,
+        };
+        let bytes = postcard::to_slice(&request, &mut room).expect("room");
+        assert_eq!(
+            postcard::from_bytes::<Request<'_>>(bytes).as_ref(),
+            Ok(&request)
+        );
+        text.push(hex(bytes));
+    }
+    let reply = |answer| {
+        FromBridge::Reply(Reply {
+            session: 70_000,
+            sequence: 2,
+            answer,
+        })
+    };
+    let replies = answers()
+        .into_iter()
+        .map(Ok)
+        .chain(refusals().into_iter().map(Err));
+    let messages = replies
+        .map(reply)
+        .chain(samples().into_iter().map(FromBridge::Sample));
+    for message in messages {
+        let bytes = postcard::to_slice(&message, &mut room).expect("room");
+        assert_eq!(
+            postcard::from_bytes::<FromBridge>(bytes).as_ref(),
+            Ok(&message)
+        );
+        text.push(hex(bytes));
+    }
+    text
+}
+
+#[test]
+fn every_message_of_version_3_has_the_bytes_it_always_had() {
+    assert_eq!(VERSION, 3, "another version has a golden file of its own");
+    let lines = lines();
+    for (number, (now, golden)) in lines.iter().zip(GOLDEN.lines()).enumerate() {
+        assert_eq!(now, golden, "line {}", number + 1);
+    }
+    assert_eq!(lines.len(), GOLDEN.lines().count());
+}
