@@ -25,7 +25,7 @@ use host::session::record::{self, Feed, Records, Sort};
 use host::session::{Ending, Order, Session, Snapshot};
 use shown::Shown;
 
-pub use finished::{Finished, first_failure};
+pub use finished::Finished;
 
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);

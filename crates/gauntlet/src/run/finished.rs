@@ -67,7 +67,7 @@ impl Finished {
 ///
 /// # Errors
 /// That one.
-pub fn first_failure<T>(
+fn first_failure<T>(
     stopped: Result<()>,
     driven: Result<T>,
     rest: impl IntoIterator<Item = Result<()>>,

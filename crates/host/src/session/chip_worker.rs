@@ -13,7 +13,6 @@ use bridge::protocol::message::{Counters, Sample, Status};
 use super::axes::Axes;
 use super::chip_stop::stop;
 use super::hub::{Happened, Hub, Totals};
-use super::on_chip::Left;
 use super::orders::{Order, Queue};
 use super::record::Sort;
 use super::snapshot::{self, Snapshot};
@@ -21,7 +20,7 @@ use super::stopped::Stopped;
 use crate::chip::link::{Error, Heartbeat, HostLink};
 
 /// Pause between two looks at the orders, spent listening.
-const LISTEN: Duration = Duration::from_millis(20);
+const LISTEN: Duration = Duration::from_millis(10);
 /// Pause between two heartbeats: what else is asked is answered in it or not at all.
 const HEARTBEAT: Duration = Duration::from_millis(100);
 /// Pause between two questions for the status without heartbeats; a session ends after 2 s.
@@ -34,6 +33,15 @@ const COUNT_EVERY: Duration = Duration::from_secs(1);
 const MISSED_BEATS: u32 = 20;
 /// Frames between two looks at the counters that say something of the glove.
 const LEAST_FRAMES: u32 = 5;
+
+/// What a conversation leaves.
+#[derive(Debug)]
+pub(super) struct Left {
+    /// How the gripper was left; untouched where this session never closed the clutch.
+    pub stopped: Stopped,
+    /// What ended it.
+    pub fault: Option<Error>,
+}
 
 /// A calibration that is tried as often as it takes.
 #[derive(Debug, Clone, Copy)]
@@ -120,6 +128,7 @@ impl Worker {
 
     /// Returns whether to go on.
     fn round(&mut self) -> Result<bool, Error> {
+        let begun = Instant::now();
         let mut quiet = self.epoch.is_none();
         while let Some(order) = self.orders.next() {
             if order == Order::Stop {
@@ -135,7 +144,7 @@ impl Worker {
             self.look_at_calibration()?;
         }
         if quiet {
-            self.count()?;
+            self.count(begun + HEARTBEAT)?;
         }
         for sample in self.link.listen(LISTEN)? {
             self.hub.lock().numbers.sample(&sample);
@@ -251,12 +260,12 @@ impl Worker {
         });
     }
 
-    /// Once a second, where the answer comes before the next heartbeat.
-    fn count(&mut self) -> Result<(), Error> {
+    /// Once a second, where the answer comes by `end`, when the next heartbeat is due.
+    fn count(&mut self, end: Instant) -> Result<(), Error> {
         if self.counted.0.elapsed() < COUNT_EVERY {
             return Ok(());
         }
-        if let Some(counters) = self.link.counters_by(Instant::now() + HEARTBEAT)? {
+        if let Some(counters) = self.link.counters_by(end)? {
             self.take_counters(counters);
         }
         Ok(())

@@ -17,28 +17,13 @@ use super::orders::{Order, Orders};
 use super::record::Feed;
 use super::slots::MemorySlot;
 use super::stopped::Stopped;
-use super::worker::Worker;
+use super::worker::{PcApp, Worker};
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail, told};
 use crate::interrupt::Interrupt;
 use crate::lines::port::{BAUD, Port, Watch};
 use crate::lines::{Line, Model, Pc, Settings};
 use crate::realtime::{self, Scheduling};
-
-impl Board<4> for Pc {
-    type Glove = Port;
-    type Gripper = ThreeFinger<Line>;
-    type Flash = MemorySlot;
-}
-
-impl Board<1> for Pc {
-    type Glove = Port;
-    type Gripper = TwoFinger<Line>;
-    type Flash = MemorySlot;
-}
-
-/// The bridge as a PC runs it, for a gripper of `X` axes.
-pub(super) type PcApp<const X: usize> = App<Pc, X>;
 
 /// What a session is made of.
 #[derive(Debug)]

@@ -10,7 +10,7 @@ use anyhow::Result;
 use bridge::protocol::message::Sample;
 
 use super::Session;
-use super::chip_worker::Worker;
+use super::chip_worker::{Left, Worker};
 use super::hub::Hub;
 use super::orders::{Order, Orders};
 use super::stopped::Stopped;
@@ -22,15 +22,6 @@ use crate::realtime::Scheduling;
 
 /// Pause between two telemetry samples, ms.
 pub const SAMPLE_MS: u16 = 50;
-
-/// What a conversation leaves.
-#[derive(Debug)]
-pub(super) struct Left {
-    /// How the gripper was left; untouched where this session never closed the clutch.
-    pub stopped: Stopped,
-    /// What ended it.
-    pub fault: Option<Error>,
-}
 
 /// A bridge on a chip.
 #[derive(Debug)]

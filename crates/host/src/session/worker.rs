@@ -3,17 +3,34 @@
 use bridge::calibration::Try;
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
-use bridge::{Board, Epoch, HoldReason, State, Telemetry};
+use bridge::{App, Board, Epoch, HoldReason, State, Telemetry};
+use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::{Activation, Instant, Status};
 
 use super::hub::{Happened, Hub, Said, Totals};
-use super::in_process::PcApp;
 use super::orders::{Order, Queue};
 use super::record::{Command, Feed, Frame, Imu, Record, Sort};
+use super::slots::MemorySlot;
 use super::snapshot::Snapshot;
 use super::stopped::{HOLD_WAIT, Stopped};
-use crate::lines::Pc;
+use crate::lines::port::Port;
+use crate::lines::{Line, Pc};
 use crate::realtime::Scheduling;
+
+impl Board<4> for Pc {
+    type Glove = Port;
+    type Gripper = ThreeFinger<Line>;
+    type Flash = MemorySlot;
+}
+
+impl Board<1> for Pc {
+    type Glove = Port;
+    type Gripper = TwoFinger<Line>;
+    type Flash = MemorySlot;
+}
+
+/// The bridge as a PC runs it, for a gripper of `X` axes.
+pub(super) type PcApp<const X: usize> = App<Pc, X>;
 
 /// The thread's side of a session in this process.
 pub(super) struct Worker {
