@@ -131,6 +131,74 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
     }
 }
 
+/// The gripper's cycles a second of a whole session, and where the hand's two ends put it: open from the start, a fist after
+/// `half` seconds.
+fn open_and_fist(model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]) {
+    let Devices {
+        clock,
+        glove: _glove,
+        glove_wire,
+        gripper,
+        gripper_wire,
+    } = Devices::with(
+        move |time_s| hand((time_s - half as f64).clamp(0.0, 1.0) as f32),
+        family,
+    );
+    gripper.preset_active();
+    let mut store = empty_store(1);
+    let image = image(1);
+    store.begin(image.len()).expect("room");
+    store.chunk(0, &image).expect("bytes");
+    store.commit().expect("an image of one output");
+    let mut app: App<Machine, 1> = App::new(
+        Machine(clock.clone()),
+        Scanner::new(glove_wire, glove::scan::Config::default()),
+        TwoFinger::new(gripper_wire, model, gripper::driver::Config::default()),
+        store,
+        Config::default(),
+    );
+    app.set_calibration(glove::hand::Calibration::identity());
+    let epoch = app.engage();
+    let (mut beat, mut ends, mut cycles) = (HEARTBEAT, [f32::NAN; 2], Vec::new());
+    for second in 1..=2 * half {
+        let before = app.telemetry().status_sequence;
+        let end = Instant::from_ticks(second * 1_000_000);
+        while clock.now() < end {
+            if clock.now().as_ticks() >= beat {
+                assert_eq!(app.heartbeat(epoch), Ok(()));
+                beat += HEARTBEAT;
+            }
+            let due = app.step();
+            app.platform_mut().wait_until(due.min(end));
+        }
+        cycles.push(app.telemetry().status_sequence - before);
+        if second % half == 0 {
+            assert_eq!(app.telemetry().state, State::Following, "{family:?}");
+            ends[(second / half) as usize - 1] = gripper.positions()[0];
+        }
+    }
+    (cycles, ends)
+}
+
+#[test]
+fn an_open_hand_opens_a_two_finger_gripper_a_fist_closes_it_and_100_cycles_a_second_are_held() {
+    for (model, family, half) in [
+        (Model::TwoFinger85, Family::TwoFinger85, 55),
+        (Model::TwoFinger140, Family::TwoFinger140, 6),
+        (Model::HandE, Family::HandE, 6),
+    ] {
+        let (cycles, [open, closed]) = open_and_fist(model, family, half);
+        println!("{family:?}: {open:.1} open, {closed:.1} closed, cycles {cycles:?}");
+        assert!(open <= 5.0, "{family:?}: {open}");
+        assert!(closed >= 250.0, "{family:?}: {closed}");
+        // The first two seconds bring the sensors up and find out the family.
+        let held = &cycles[2..];
+        assert!(held.iter().all(|count| *count >= 100), "{cycles:?}");
+        let all: u32 = held.iter().sum();
+        assert!(half < 55 || all >= 10_000, "{all} cycles");
+    }
+}
+
 #[test]
 fn an_image_of_another_number_of_outputs_is_refused() {
     for (axes, outputs) in [(1, 4), (4, 1)] {

@@ -5,12 +5,10 @@
 //! | [`cli`], [`commands`] | the command line and its verbs |
 //! | [`out`], [`tell`], [`progress`] | what a person reads |
 //! | [`reading`], [`outputs`], [`played`] | files that are read, files that may be written over, motion that is played |
-//! | [`run`], [`live`] | a run as a person sees it |
-//! | [`chip`] | the same of a bridge on a chip |
+//! | [`run`], [`live`] | a run as a person sees it, of a bridge in this process or on a chip |
 //!
 //! Everything that another program could use is in [`host`].
 
-pub mod chip;
 pub mod cli;
 pub mod commands;
 pub mod live;

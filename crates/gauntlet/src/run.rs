@@ -1,14 +1,9 @@
 //! A run of the bridge as a person sees it: heartbeat, keys, live view, log and numbers, until its time is over.
 
-pub mod calibrating;
+mod bringup;
 mod clutch;
-mod ending;
-mod lasting;
-mod numbers;
-mod obeyed;
-mod replies;
+mod finished;
 mod shown;
-mod summary;
 mod view;
 
 use std::io::IsTerminal;
@@ -17,33 +12,25 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::event::Kind;
-use bridge::telemetry::Sent;
-use bridge::{HoldReason, State};
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::live::{Key, Live};
 use crate::{note, out};
+use clutch::Clutch;
 use host::clock::Clock;
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
-use host::recording::SessionLog;
-use host::session::record::{AXES, Record, Sort};
-use host::session::{Order, Session, Snapshot};
+use host::recording::{QUEUE, SessionLog};
+use host::session::record::{self, Feed, Records, Sort};
+use host::session::{Ending, Order, Session, Snapshot};
 use shown::Shown;
 
-pub use ending::{Ending, Finished, first_failure};
-pub use lasting::Lasting;
-pub use numbers::Numbers;
-pub use obeyed::{MOVED_COUNTS, Obeyed};
-pub use replies::Failed;
-pub use summary::Summary;
+pub use finished::{Finished, first_failure};
 
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
 const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
-/// Records of the bring-up that wait for the log, which is made after it: some 30 s.
-const EARLY: usize = 8192;
 /// By then whoever wrote beyond a file's limit was told.
 const FILE_LIMIT_TOLD: Duration = Duration::from_millis(300);
 /// For the hold before Ctrl-Z stops the program.
@@ -58,6 +45,8 @@ pub struct Options {
     pub seconds: Option<Duration>,
     /// Whether the clutch is closed from the start.
     pub engage: bool,
+    /// Whether a person may close the clutch and calibrate; else the bridge is only watched.
+    pub drives: bool,
     /// No view at all (for `--json`).
     pub quiet: bool,
 }
@@ -71,34 +60,43 @@ pub enum End {
     Asked,
 }
 
+/// A log that is made when driving begins: a bring-up that fails leaves no file. What comes before waits in its queue.
+#[derive(Debug)]
+pub struct LogTo {
+    path: PathBuf,
+    axes: usize,
+    records: Records,
+}
+
+impl LogTo {
+    /// At `path`, for a gripper with so many axes; and where its session hands the records.
+    pub fn new(path: PathBuf, axes: usize) -> (Self, Feed) {
+        let (feed, records) = record::queue(QUEUE);
+        let log = Self {
+            path,
+            axes,
+            records,
+        };
+        (log, feed)
+    }
+}
+
 /// A session that somebody watches.
 #[derive(Debug)]
 pub struct Run {
-    session: Session,
-    /// Where the log will be.
-    log_path: Option<PathBuf>,
+    session: Box<dyn Session>,
+    log_to: Option<LogTo>,
     log: Option<SessionLog>,
-    /// What came before the log was made.
-    early: Vec<Record>,
-    early_lost: u64,
     /// Its end was noted.
     log_end_noted: bool,
     clock: Clock,
     interrupt: Interrupt,
-    numbers: Numbers,
-    clutch: bool,
-    /// When a person closed it last.
-    engaged: Option<Instant>,
-    /// It opened by itself, and nobody touched it since.
-    expired: bool,
+    clutch: Clutch,
     /// Somebody can press keys.
     attended: bool,
-    heartbeat: Option<Instant>,
     shown: Shown,
-    /// What holds the gripper.
-    held: Lasting<HoldReason>,
-    /// No frame of the glove can be used.
-    useless: Lasting<()>,
+    /// Events that were shown.
+    happened: u64,
     /// The view was not taken for so long that nobody sees it.
     unseen: bool,
     /// When a file grew to its limit.
@@ -107,46 +105,38 @@ pub struct Run {
 }
 
 impl Run {
-    /// Watches `session`. What it sees goes into a log at `log_path`, which is made when driving begins: a bring-up that fails
-    /// leaves no file.
+    /// Watches `session`, and makes its log when driving begins.
     pub fn new(
-        session: Session,
-        log_path: Option<PathBuf>,
+        session: impl Session + 'static,
+        log_to: Option<LogTo>,
         clock: Clock,
         interrupt: Interrupt,
     ) -> Self {
         Self {
-            session,
-            log_path,
+            session: Box::new(session),
+            log_to,
             log: None,
-            early: Vec::new(),
-            early_lost: 0,
             log_end_noted: false,
             clock,
             interrupt,
-            numbers: Numbers::default(),
-            clutch: false,
-            engaged: None,
-            expired: false,
+            clutch: Clutch::default(),
             attended: false,
-            heartbeat: None,
             shown: Shown::default(),
-            held: Lasting::default(),
-            useless: Lasting::default(),
+            happened: 0,
             unseen: false,
             file_limit: None,
             ending: None,
         }
     }
 
-    /// The session.
-    pub fn session(&self) -> &Session {
-        &self.session
+    /// The state now.
+    pub fn snapshot(&self) -> Option<Snapshot> {
+        self.session.snapshot()
     }
 
-    /// What was counted so far.
-    pub fn numbers(&self) -> &Numbers {
-        &self.numbers
+    /// Whether somebody asked for the end.
+    pub fn asked(&self) -> bool {
+        self.interrupt.asked()
     }
 
     /// Looks after the session until `done` says so, for `time` at most, without a view. Returns whether it did.
@@ -212,23 +202,18 @@ impl Run {
     pub fn drive(&mut self, options: &Options) -> Result<End> {
         self.start_log()?;
         let driven = self.watch(options);
-        self.ending = self.session.snapshot().map(|seen| self.ending(&seen));
+        self.ending = self.ending();
         driven
     }
 
-    fn ending(&self, seen: &Snapshot) -> Ending {
-        let now = Instant::now();
-        let useless = self.useless.lasted(now);
-        Ending {
-            state: seen.state,
-            attended: self.attended,
-            expired: self.expired,
-            held: self.held.lasted(now),
-            glove_answers: seen.glove_answers,
-            useless: useless.map(|()| shown::why_useless(seen)),
-            gripper_answers: seen.gripper_answers,
-            disobeyed: self.numbers.obeyed.fault(),
+    fn ending(&self) -> Option<Ending> {
+        let hub = self.session.hub();
+        let mut ending = hub.ending(self.attended, self.clutch.expired)?;
+        if !self.clutch.ours() {
+            // Who only watches is not to blame for what another host's run came to.
+            (ending.held, ending.disobeyed) = (None, None);
         }
+        Some(ending)
     }
 
     fn watch(&mut self, options: &Options) -> Result<End> {
@@ -243,18 +228,13 @@ impl Run {
             self.engage();
         }
         let started = Instant::now();
-        self.numbers.begin(self.clock.now());
-        let mut last_round = started;
+        self.session.hub().begin();
         loop {
             // Nobody sees the view: as if nobody were there.
             self.unseen = live.unseen();
             self.round()?;
-            let moving = self.session.snapshot().map(|s| s.state.is_moving());
-            self.numbers
-                .pass(last_round.elapsed(), self.clutch, moving == Some(true));
-            last_round = Instant::now();
             for key in live.keys().or_fail(terminal, next)? {
-                self.obey(key);
+                self.obey(key, options);
             }
             let keys = live.interactive();
             self.attended = keys;
@@ -287,21 +267,19 @@ impl Run {
         let mut held = false;
         while !held && Instant::now() < end && !self.interrupt.sleep(ROUND) {
             self.round()?;
-            held = self.session.snapshot().is_some_and(|seen| {
-                let holds = |sent: Sent<AXES>| !sent.follows && sent.decided > released;
-                seen.state == State::Idle && seen.sent.is_none_or(holds)
-            });
+            held = self.session.hub().is_idle_since(released);
         }
         Ok(())
     }
 
     /// Makes the log's file, with what came so far in it.
     fn start_log(&mut self) -> Result<()> {
-        let Some(path) = &self.log_path else {
+        let Some(to) = self.log_to.take() else {
             return Ok(());
         };
-        let early = std::mem::take(&mut self.early);
-        self.log = Some(SessionLog::create(path, self.clock, early)?);
+        self.log = Some(SessionLog::create(
+            &to.path, to.axes, self.clock, to.records,
+        )?);
         self.interrupt.look_after_file_limit();
         Ok(())
     }
@@ -326,28 +304,21 @@ impl Run {
     /// Holds the gripper, ends the session, finishes the log and sums up. Always: what failed is part of what is left.
     pub fn finish(mut self) -> Finished {
         let stopped = self.session.stop();
-        self.take_records();
-        let lost = self.session.lost() + self.early_lost;
-        let counters = self.session.snapshot().map(|s| s.counters);
-        let summary = self.numbers.summary(counters, self.session.scheduling());
-        let log = self.log.take().map(|log| {
-            let mut written = log.finish();
-            written.lost += lost;
-            written
-        });
+        let log = self.log.take().map(SessionLog::finish);
         Finished {
-            summary,
+            summary: self.session.hub().summary(),
             log,
             stopped,
             ending: self.ending,
         }
     }
 
-    fn obey(&mut self, key: Key) {
+    fn obey(&mut self, key: Key, options: &Options) {
         match key {
             Key::End => self.interrupt.ask(),
+            _ if !options.drives => {}
             Key::Clutch => {
-                if self.clutch {
+                if self.clutch.closed {
                     self.release();
                 } else {
                     self.engage();
@@ -361,26 +332,20 @@ impl Run {
     /// What has to be done every few milliseconds.
     fn round(&mut self) -> Result<()> {
         if !self.session.running() {
-            // Says what ended it.
-            self.session.stop()?;
-            anyhow::bail!("the bridge ended");
+            return Err(self.session.ended());
         }
         let now = Instant::now();
         let due = self
+            .clutch
             .heartbeat
             .is_none_or(|last| now.duration_since(last) >= HEARTBEAT - ROUND / 2);
-        if self.clutch && due && !self.unseen {
-            self.heartbeat = Some(now);
+        if self.clutch.closed && due && !self.unseen {
+            self.clutch.heartbeat = Some(now);
             self.order(Order::Heartbeat);
         }
         self.look_at_clutch();
         self.look_at_file_limit();
-        if let Some(seen) = self.session.snapshot() {
-            let unusable = seen.frame_sequence > 0 && !seen.angles_valid;
-            self.useless.look(unusable.then_some(()), now);
-            self.held.look(seen.state.hold_reason(), now);
-        }
-        self.take_records();
+        self.look_at_events();
         Ok(())
     }
 
@@ -400,25 +365,14 @@ impl Run {
         }
     }
 
-    fn take_records(&mut self) {
-        for record in self.session.records() {
-            self.numbers.count(&record);
-            match &record {
-                Record::Event {
-                    sort, text, kind, ..
-                } if *sort == Sort::Fault || matches!(kind, Kind::Calibration(_)) => {
-                    self.shown.happened(text, *kind);
-                }
-                Record::Status(status) => self.shown.status(status, Instant::now()),
-                _ => {}
+    fn look_at_events(&mut self) {
+        for event in self.session.hub().happened(&mut self.happened) {
+            if event.sort == Sort::Fault || matches!(event.kind, Kind::Calibration(_)) {
+                self.shown.happened(&event.text, event.kind);
             }
-            if let Some(log) = &mut self.log {
-                log.take(record);
-            } else if self.log_path.is_some() && self.early.len() < EARLY {
-                self.early.push(record);
-            } else if self.log_path.is_some() {
-                self.early_lost += 1;
-            }
+        }
+        if let Some(status) = self.session.snapshot().and_then(|seen| seen.status) {
+            self.shown.status(&status, Instant::now());
         }
     }
 }

@@ -1,4 +1,24 @@
-//! The bridge as a PC has it.
+//! The bridge as a PC has it, for any program: lines, sessions, recording, training of hands, diagnosis.
+//!
+//! | module | what it is for |
+//! |---|---|
+//! | [`lines`], [`probe`] | serial ports, Modbus TCP; does the right device answer there? |
+//! | [`session`] | a bridge that is driven and watched, in this process or on a chip |
+//! | [`recording`] | the session log |
+//! | [`training`] | maps of hands, and of other domains, from files |
+//! | [`chip`] | the host protocol, and the emulator |
+//! | [`diagnose`] | what is wrong with a line, and what to do |
+//! | [`failure`], [`report`], [`interrupt`] | what failed and what helps; who is told; Ctrl-C |
+//! | [`clock`], [`realtime`], [`stats`], [`words`] | time, priority, percentiles, codes in words |
+//!
+//! No command line, no terminal, no printing: who calls decides what a person sees. Nothing moves by connecting; the clutch
+//! is closed by [`session::Order::Engage`], an act of a person, and kept closed by a heartbeat every 100 ms.
+//!
+//! A gripper that follows a hand (`cargo run -p host --example follow GLOVE GRIPPER IMAGE`):
+//!
+//! ```no_run
+#![doc = include_str!("../examples/follow.rs")]
+//! ```
 
 pub mod chip;
 pub mod clock;

@@ -5,17 +5,17 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use embedded_io::{Read, ReadReady, Write};
-use gripper::driver::ThreeFinger;
-use gripper::{Event, Gripper, Status};
+use gripper::driver::{Driver, Family, ThreeFinger, TwoFinger};
+use gripper::registers::Kind;
+use gripper::{Activation, Event, Gripper};
 
 use crate::clock::Clock;
 use crate::diagnose;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::lines::port::{BAUD, Port};
-use crate::lines::{Line, Settings};
+use crate::lines::{Line, Model, Settings, tcp};
 use crate::report::Reporter;
-use crate::session::record::AXES;
 
 /// The SC18IM's speed after a reset.
 const RESET_BAUD: u32 = 9_600;
@@ -123,45 +123,48 @@ fn discard(port: &mut Port) {
 /// As [`open_gripper_with`].
 pub fn open_gripper(
     path: &Path,
+    model: Model,
     reporter: &dyn Reporter,
     interrupt: &Interrupt,
-) -> Result<(Line, Status<AXES>)> {
-    open_gripper_with(path, Settings::default(), reporter, interrupt)
+) -> Result<(Line, Activation)> {
+    open_gripper_with(path, model, Settings::default(), reporter, interrupt)
 }
 
-/// The same where unit, speed or patience differ from those of a gripper as delivered.
+/// The same where unit, speed or patience differ from those of a gripper as delivered. Says how ready it is.
 ///
 /// # Errors
 /// A failure that says whether the port does not open or nobody answers on it, what came instead, and what to try.
 pub fn open_gripper_with(
     path: &Path,
+    model: Model,
     settings: Settings,
     reporter: &dyn Reporter,
     interrupt: &Interrupt,
-) -> Result<(Line, Status<AXES>)> {
+) -> Result<(Line, Activation)> {
+    if model.two_finger().is_some() && tcp::Address::parse(path)?.is_some() {
+        return Err(only_three_finger_on_tcp().into());
+    }
     let mut port = Line::open(path, settings, interrupt)?;
     let config = port.driver_config(settings);
-    let clock = Clock::start();
-    let end = Instant::now() + GRIPPER_WAIT;
-    let mut driver = ThreeFinger::new(&mut port, config);
-    let mut other = None;
-    while Instant::now() < end && other.is_none() && !interrupt.sleep(LOOK) {
-        match driver.poll(clock.now()) {
-            Some(Event::Status(status)) => {
-                drop(driver);
-                return Ok((port, status));
-            }
-            Some(Event::Failed(gripper::Error::OtherGripper(kind))) => other = Some(kind),
-            Some(Event::Failed(_) | Event::Sent) | None => {}
+    let answer = match model.two_finger() {
+        None => first_status(ThreeFinger::new(&mut port, config), interrupt),
+        Some(two) => {
+            let mut driver = TwoFinger::new(&mut port, two, config);
+            // A 3-Finger gripper would take its commands, too.
+            driver.identify();
+            first_status(driver, interrupt)
         }
-    }
-    drop(driver);
+    };
+    let other = match answer {
+        Ok(activation) => return Ok((port, activation)),
+        Err(other) => other,
+    };
     drop(port);
     if interrupt.asked() {
         return Err(Failure::interrupted("while the gripper was looked for").into());
     }
     if let Some(kind) = other {
-        return Err(other_gripper(path, kind).into());
+        return Err(other_gripper(path, model, kind).into());
     }
     let what = format!(
         "no gripper answers on {} as unit {}",
@@ -170,22 +173,56 @@ pub fn open_gripper_with(
     );
     let asked = diagnose::Asked {
         settings,
-        model: None,
+        model: model.two_finger().map(|_| model),
         reporter: Some(reporter),
     };
     Err(diagnose::no_gripper(&what, path, asked, interrupt).into())
 }
 
-fn other_gripper(path: &Path, kind: gripper::registers::Kind) -> Failure {
+/// How ready the gripper is; else which other one answers, if one does.
+fn first_status<S, F, const X: usize>(
+    mut driver: Driver<S, F, X>,
+    interrupt: &Interrupt,
+) -> Result<Activation, Option<Kind>>
+where
+    S: Read + ReadReady + Write,
+    F: Family<X>,
+{
+    let clock = Clock::start();
+    let end = Instant::now() + GRIPPER_WAIT;
+    while Instant::now() < end && !interrupt.sleep(LOOK) {
+        match driver.poll(clock.now()) {
+            Some(Event::Status(status)) => return Ok(status.activation),
+            Some(Event::Failed(gripper::Error::OtherGripper(kind))) => return Err(Some(kind)),
+            Some(Event::Failed(_) | Event::Sent) | None => {}
+        }
+    }
+    Err(None)
+}
+
+/// What to say to who wants another gripper on the network.
+pub fn only_three_finger_on_tcp() -> Failure {
+    Failure::usage(
+        "only the 3-Finger gripper speaks Modbus TCP",
+        "a serial port, or the 3f model",
+    )
+}
+
+fn other_gripper(path: &Path, model: Model, kind: Kind) -> Failure {
+    let (names, more) = match model.two_finger() {
+        None => (
+            "2f85, 2f140 or hande",
+            "the one that it is, and a map of one output",
+        ),
+        Some(_) => ("3f", "and a map of four outputs"),
+    };
     Failure::new(
         format!(
-            "a {} answers on {}, and a glove drives the 3-Finger gripper only: nothing was written to it",
+            "a {} answers on {}, not a {}: nothing was written to it",
             kind.name(),
-            path.display()
+            path.display(),
+            model.name()
         ),
-        format!(
-            "`gauntlet gripper move --gripper {} --gripper-model 2f85 --to 100`",
-            path.display()
-        ),
+        format!("the same with --gripper-model {names}, {more}"),
     )
 }

@@ -2,18 +2,31 @@
 
 use glove::hand;
 use glove::scan::Health;
-use gripper::{Activation, Contact, Status};
+use gripper::{Activation, Contact};
 
 use gripper::space::AXES;
 /// The gripper's axes as a person reads them; files have [`crate::session::record::AXIS_NAMES`].
 pub const AXIS_WORDS: [&str; AXES] = ["finger A", "finger B", "finger C", "scissor"];
 
+/// The same of a gripper with so many axes.
+pub fn axis_words(axes: usize) -> &'static [&'static str] {
+    match axes {
+        1 => &["fingers"],
+        _ => &AXIS_WORDS,
+    }
+}
+
 /// The fingers, thumb first: each has five joint angles in a row.
 pub const FINGER_NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 
-/// gFLT of a status.
-pub fn fault_code(status: &Status<AXES>) -> u8 {
-    status.fault.code()
+/// What is wrong with a gripper, and what to do.
+pub fn fault(fault: gripper::Fault) -> String {
+    format!(
+        "gripper fault {:02X}: {}; {}",
+        fault.code(),
+        fault.sentence(),
+        fault.action()
+    )
 }
 
 /// gIMC: 0 reset, 1 activating, 2 changing mode, 3 ready.

@@ -1,29 +1,28 @@
 //! `gauntlet bridge`: a bridge on a chip, asked, watched and told over the host protocol.
 
-use std::io::BufWriter;
 use std::path::Path;
+use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::calibration::{Refusal, Try};
-use bridge::protocol::message::{Health, Restart, Status};
-use gripper::Activation;
+use bridge::calibration::Try;
+use bridge::protocol::message::{Health, Restart, Sample, Status};
+use gripper::{Activation, Fault};
 use serde_json::json;
 
+use super::bridge_log::Poses;
 use super::flash::slot_lines;
-use crate::chip::{Options, Watch, Watched, standing_faults, write_head, write_row};
 use crate::cli::{Bridge, BridgeAt, BridgeVerb};
 use crate::out;
-use crate::run::calibrating;
+use crate::run::{Finished, Options, Run};
 use crate::tell::Tell;
 use host::chip::link::{Error, HostLink};
-use host::failure::{Failure, OrFail};
+use host::clock::Clock;
+use host::failure::Failure;
 use host::interrupt::Interrupt;
+use host::session::OnChip;
 use host::words;
 
-/// An activation takes a few seconds; a gripper that needs longer has a fault.
-const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
-const PAUSE: Duration = Duration::from_millis(100);
 /// For the bridge to see that its clutch was opened.
 const RELEASE_WAIT: Duration = Duration::from_secs(2);
 
@@ -190,23 +189,54 @@ fn engage(
     let mut link = connect(at)?;
     // An older bridge is refused before anything moves.
     link.health().map_err(Failure::from)?;
-    if calibrate && !calibrated(&mut link, &tell, interrupt)? {
-        return Ok(());
+    let mut run = start(link, None, interrupt)?;
+    let ready = ready(&mut run, calibrate, activate, &tell);
+    let began = matches!(ready, Ok(true));
+    let driven = ready.and_then(|ready| match ready {
+        true => drive(&mut run, "gauntlet bridge engage", seconds, true, at.json),
+        false => Ok(()),
+    });
+    let finished = run.finish();
+    if !began {
+        return finished.judge(driven);
     }
-    if activate && !activated(&mut link, &tell, interrupt)? {
-        return Ok(());
-    }
-    let options = Options {
-        title: "gauntlet bridge engage",
-        seconds,
-        engage: true,
-        quiet: at.json,
-    };
-    let watched = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
-    if let Some(left) = watched.left() {
+    if let Some(left) = finished.left() {
         tell.say(format_args!("the clutch is open: {left}"));
     }
-    finish(at, &tell, watched)
+    finish(at, &tell, finished, driven)
+}
+
+/// What comes before the clutch may close. Returns whether to go on.
+fn ready(run: &mut Run, calibrate: bool, activate: bool, tell: &Tell) -> Result<bool> {
+    Ok((!calibrate || run.calibrate(tell)?) && (!activate || run.activate(tell)?))
+}
+
+/// A run of the bridge behind `link`.
+pub(super) fn start(
+    link: HostLink,
+    samples: Option<SyncSender<Sample>>,
+    interrupt: &Interrupt,
+) -> Result<Run> {
+    let clock = Clock::start();
+    let session = OnChip::start(link, clock, samples)?;
+    Ok(Run::new(session, None, clock, interrupt.clone()))
+}
+
+fn drive(
+    run: &mut Run,
+    title: &'static str,
+    seconds: Option<Duration>,
+    engage: bool,
+    quiet: bool,
+) -> Result<()> {
+    let options = Options {
+        title,
+        seconds,
+        engage,
+        drives: engage,
+        quiet,
+    };
+    run.drive(&options).map(drop)
 }
 
 fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
@@ -215,153 +245,58 @@ fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
     if undo {
         link.undo_calibration().map_err(Failure::from)?;
         tell.say(format_args!("the newest calibration was taken back"));
-    } else if !calibrated(&mut link, &tell, interrupt)? {
+        if at.json {
+            return out::json(&link.health().map_err(Failure::from)?.calibration);
+        }
         return Ok(());
     }
+    // An older bridge is refused by name.
+    link.health().map_err(Failure::from)?;
+    let mut run = start(link, None, interrupt)?;
+    let taken = run.calibrate(&tell);
+    let now = run.snapshot().map(|seen| seen.calibration);
+    run.finish().judge(taken)?;
     if at.json {
-        return out::json(&link.health().map_err(Failure::from)?.calibration);
+        return out::json(&now);
     }
     Ok(())
 }
 
-/// Takes the hand as flat once it has been still, as often as it takes within [`calibrating::WAIT`]. Returns whether to go on.
-pub(super) fn calibrated(link: &mut HostLink, tell: &Tell, interrupt: &Interrupt) -> Result<bool> {
-    tell.say(format_args!("{}", calibrating::ASK));
-    let end = Instant::now() + calibrating::WAIT;
-    loop {
-        let before = link.health().map_err(Failure::from)?.calibration.ended;
-        link.calibrate_flat_hand().map_err(Failure::from)?;
-        let newest = loop {
-            let state = link.health().map_err(Failure::from)?.calibration;
-            if state.ended != before {
-                break state.newest;
-            }
-            if interrupt.sleep(PAUSE) {
-                return Ok(false);
-            }
-            if Instant::now() >= end {
-                break Try::Waiting;
-            }
-        };
-        match newest {
-            Try::Refused(why) if Instant::now() >= end || why == Refusal::Engaged => {
-                return Err(calibrating::refused(why).into());
-            }
-            Try::Refused(_) => {}
-            Try::Taken => {
-                tell.say(format_args!("{}", calibrating::DONE));
-                return Ok(true);
-            }
-            Try::None | Try::Waiting | Try::Undone => {
-                return Err(Failure::new(
-                    "the bridge did not say how the calibration ended",
-                    "`gauntlet bridge status`, which says whether it is calibrated; then the same again",
-                )
-                .into());
-            }
-        }
-    }
-}
-
-/// Activates the gripper where it is not, and waits. Returns whether to go on.
-pub(super) fn activated(link: &mut HostLink, tell: &Tell, interrupt: &Interrupt) -> Result<bool> {
-    let end = Instant::now() + ACTIVATION_WAIT;
-    let mut asked = false;
-    loop {
-        let status = link.status().map_err(Failure::from)?;
-        match status.gripper.as_ref().map(|gripper| gripper.activation) {
-            Some(Activation::Ready) => return Ok(true),
-            Some(_) if !asked => {
-                tell.say(format_args!("activating the gripper: its fingers move"));
-                link.activate().map_err(Failure::from)?;
-                asked = true;
-            }
-            _ => {}
-        }
-        if Instant::now() >= end {
-            return Err(Failure::new(
-                format!(
-                    "the gripper was not ready after {} s: {}",
-                    ACTIVATION_WAIT.as_secs(),
-                    standing_faults(&status).join("; ")
-                ),
-                "the gripper's cable and its 24 V supply; what blocks its fingers taken away",
-            )
-            .into());
-        }
-        if interrupt.sleep(PAUSE) {
-            return Ok(false);
-        }
-    }
-}
-
 fn monitor(at: &BridgeAt, seconds: Option<Duration>, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(at.json);
-    let mut link = connect(at)?;
-    let options = Options {
-        title: "gauntlet bridge monitor",
-        seconds,
-        engage: false,
-        quiet: at.json,
-    };
-    let watched = Watch::new(&mut link, interrupt).run(&options, &mut |_| Ok(()))?;
-    finish(at, &tell, watched)
+    let mut run = start(connect(at)?, None, interrupt)?;
+    let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
+    finish(at, &tell, run.finish(), driven)
 }
 
 fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(at.json);
-    let name = || format!("the log {}", path.display());
-    let mut link = connect(at)?;
-    let file = std::fs::File::create_new(path)
-        .or_fail(name, "a new file's name, in a folder that you may write to")?;
-    let mut file = BufWriter::new(file);
-    write_head(&mut file).or_fail(name, "room on the disk")?;
-    let options = Options {
-        title: "gauntlet bridge log",
-        seconds,
-        engage: false,
-        quiet: at.json,
-    };
-    let mut rows = 0u64;
-    let mut last_frame = None;
-    let watched = Watch::new(&mut link, interrupt).run(&options, &mut |sample| {
-        // The same frame twice is no new pose; before the first frame there is none.
-        if sample.frame_sequence == 0
-            || last_frame.replace(sample.frame_sequence) == Some(sample.frame_sequence)
-        {
-            return Ok(());
-        }
-        rows += 1;
-        write_row(&mut file, sample)
+    let link = connect(at)?;
+    let (poses, samples) = Poses::create(path, interrupt)?;
+    let driven = start(link, Some(samples), interrupt).map(|mut run| {
+        let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
+        (run.finish(), driven)
     });
-    let written = file
-        .into_inner()
-        .map_err(|error| error.into_error())
-        .and_then(|file| file.sync_all());
-    if rows == 0 {
-        // An empty file would stand in the way of the same command again.
-        let _ = std::fs::remove_file(path);
-    }
-    written.or_fail(name, "room on the disk")?;
-    let watched = watched?;
+    let rows = poses.finish()?;
+    let (finished, driven) = driven?;
     tell.say(format_args!(
         "log        {} with {rows} poses",
         path.display()
     ));
-    finish(at, &tell, watched)
+    finish(at, &tell, finished, driven)
 }
 
 /// The numbers, then the judgement over all of it.
-fn finish(at: &BridgeAt, tell: &Tell, watched: Watched) -> Result<()> {
+fn finish(at: &BridgeAt, tell: &Tell, finished: Finished, driven: Result<()>) -> Result<()> {
     if at.json {
-        out::json(&watched.summary)?;
+        out::json(&finished.summary)?;
     } else {
-        let lines = watched.summary.lines();
+        let lines = finished.summary.lines();
         lines
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
     }
-    watched.judge().map(drop)
+    finished.judge(driven)
 }
 
 fn select(at: &BridgeAt, slot: u8) -> Result<()> {
@@ -384,4 +319,24 @@ fn reboot(at: &BridgeAt) -> Result<()> {
     }
     Tell::new(false).say(format_args!("the bridge restarts"));
     Ok(())
+}
+
+/// What is wrong with the bridge's devices now.
+fn standing_faults(status: &Status) -> Vec<String> {
+    let mut faults = Vec::new();
+    if !status.glove_answers {
+        faults.push("the glove sends no frames".to_owned());
+    }
+    let Some(gripper) = &status.gripper else {
+        faults.push("the gripper does not answer".to_owned());
+        return faults;
+    };
+    if gripper.activation != Activation::Ready {
+        let activation = words::activation(gripper.activation);
+        faults.push(format!("the gripper is {activation}"));
+    }
+    if gripper.fault != Fault::None {
+        faults.push(words::fault(gripper.fault));
+    }
+    faults
 }

@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Result;
+use glove::hand::Side;
 use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
@@ -11,20 +12,22 @@ use serde_json::json;
 use trainer::algorithm::Schedule;
 use trainer::hand::Space;
 
-use super::{on_chip, teleop};
+use super::{on_chip, simulate};
 use crate::cli::Demo;
 use crate::played;
 use crate::progress::Person;
-use crate::run::{End, Finished, Options, Run};
+use crate::run::{End, Finished, LogTo, Options, Run};
 use crate::tell::Tell;
 use crate::{out, outputs, reading};
 use host::clock::Clock;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
+use host::lines::Model;
 use host::lines::port::BAUD;
 use host::probe;
 use host::realtime;
-use host::session::{Parts, Session};
+use host::session::record::Feed;
+use host::session::{InProcess, Parts};
 use host::stats::seconds;
 use host::training::model;
 use host::training::motion::Motion;
@@ -59,12 +62,15 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let outcome = trained(options, &motion, &tell, interrupt)?;
     let image = model::image(&outcome.model)?;
     let length = image.len();
-    let (devices, parts) = devices(&motion, image, &tell, interrupt)?;
-    let session = Session::start(parts, clock, interrupt)?;
+    let model = Model::ThreeFinger;
+    let log = options.log.clone();
+    let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
+    let (devices, parts) = devices(&motion, model, image, feed, &tell, interrupt)?;
+    let session = InProcess::start(parts, clock, interrupt)?;
     tell.say(format_args!(
         "weights    an image of {length} bytes is stored and checked in the bridge's weights store"
     ));
-    let mut run = Run::new(session, options.log.clone(), clock, interrupt.clone());
+    let mut run = Run::new(session, log, clock, interrupt.clone());
     let driven = drive(options, &mut run, &tell, interrupt);
     let finished = run.finish();
     drop(devices);
@@ -123,35 +129,39 @@ fn require_good(quality: &Quality) -> Result<()> {
 /// Starts both devices and opens the ports to them.
 fn devices(
     motion: &Motion,
+    model: Model,
     image: Vec<u8>,
+    feed: Option<Feed>,
     tell: &Tell,
     interrupt: &Interrupt,
 ) -> Result<([Handle; 2], Parts)> {
-    let [glove, gripper] = virtual_devices(motion)?;
+    let [glove, gripper] = virtual_devices(motion, model)?;
     tell.say(format_args!(
         "devices    virtual glove on {}, virtual gripper on {}, {BAUD} baud",
         glove.path().display(),
         gripper.path().display()
     ));
-    let (gripper_port, _) = probe::open_gripper(gripper.path(), &Person, interrupt)?;
+    let (gripper_port, _) = probe::open_gripper(gripper.path(), model, &Person, interrupt)?;
     let parts = Parts {
         glove: probe::open_glove(glove.path(), interrupt)?.port,
         gripper: gripper_port,
+        model,
         line: host::lines::Settings::default(),
         image,
-        config: bridge::Config::default(),
+        side: Side::Right,
+        feed,
     };
     Ok(([glove, gripper], parts))
 }
 
 /// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
-pub(super) fn virtual_devices(motion: &Motion) -> Result<[Handle; 2]> {
+pub(super) fn virtual_devices(motion: &Motion, model: Model) -> Result<[Handle; 2]> {
     let glove = VirtualGlove::new(
         played::virtual_hand(motion),
         rig::glove::Config::at_baud(BAUD),
     );
     let glove = spawn("glove", Box::new(glove))?;
-    let gripper = VirtualGripper::new(rig::gripper::Config::default());
+    let gripper = VirtualGripper::new(rig::gripper::Config::of(simulate::family(model)));
     let gripper = spawn("gripper", Box::new(gripper))?;
     Ok([glove, gripper])
 }
@@ -181,7 +191,7 @@ fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> R
         )
         .into());
     }
-    if !run.calibrate(tell)? || !teleop::activate(run, tell, interrupt)? {
+    if !run.calibrate(tell)? || !run.activate(tell)? {
         return Ok(End::Asked);
     }
     tell.say(format_args!(
@@ -192,6 +202,7 @@ fn drive(options: &Demo, run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> R
         title: "gauntlet demo",
         seconds: Some(options.seconds),
         engage: true,
+        drives: true,
         quiet: options.json,
     })
 }

@@ -1,6 +1,7 @@
 //! The verbs, one module each.
 
 mod bridge;
+mod bridge_log;
 mod demo;
 pub mod doctor;
 pub mod eval;

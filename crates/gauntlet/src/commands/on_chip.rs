@@ -1,29 +1,27 @@
 //! `gauntlet demo --on-chip`: the demo with the bridge's ARM firmware in QEMU between the virtual devices.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use anyhow::Result;
 use rig::pty::Handle;
 use serde_json::json;
 
 use super::{bridge, demo, flash};
-use crate::chip::{Options, Watch, Watched};
 use crate::cli::Demo;
 use crate::progress::Person;
-use crate::run::End;
+use crate::run::{End, Options, Run};
 use crate::tell::Tell;
 use crate::{out, reading};
 use host::chip::emulator::{Emulator, Setup, find_firmware};
-use host::chip::link::HostLink;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
+use host::lines::Model;
 use host::stats::seconds;
 use host::training::model;
 use host::training::motion::Motion;
 
 /// The virtual sensors boot in 650 ms and are brought up within a few seconds.
 const FRAME_WAIT: Duration = Duration::from_secs(20);
-const PAUSE: Duration = Duration::from_millis(100);
 
 /// Runs the demo on the emulated chip.
 ///
@@ -40,7 +38,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         "gauntlet demo: glove and gripper are virtual, the bridge is its ARM firmware in QEMU"
     ));
     tell.say(format_args!("motion     {}", motion.describe()));
-    let devices = demo::virtual_devices(&motion)?;
+    let devices = demo::virtual_devices(&motion, Model::ThreeFinger)?;
     let mut emulator = Emulator::new(Setup {
         firmware,
         glove: Some(devices[0].path().to_owned()),
@@ -52,12 +50,14 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let mut link = emulator.link_unless(interrupt)?;
     tell_parts(&devices, &emulator, &tell);
     let flashed = flash::flash(&mut link, &image, &tell, interrupt)?;
-    let driven = drive(options, &mut link, &tell, interrupt)?;
+    let mut run = bridge::start(link, None, interrupt)?;
+    let driven = drive(options, &mut run, &tell);
+    let finished = run.finish();
     emulator.power_off();
-    let Some(watched) = driven else {
-        return Ok(());
-    };
-    let moved = watched.summary.first_motion_s.is_some();
+    if finished.ending.is_none() {
+        return finished.judge(driven).map(drop);
+    }
+    let moved = finished.summary.first_motion_s.is_some();
     if options.json {
         out::json(&json!({
             "motion": motion.describe(),
@@ -66,21 +66,14 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             "pairs": outcome.pairs,
             "quality": outcome.quality,
             "flash": flashed,
-            "gripper": watched.stopped,
-            "run": watched.summary,
+            "gripper": finished.gripper(),
+            "run": finished.summary,
         }))?;
     } else {
-        if let Some(left) = watched.left() {
-            tell.say(format_args!("summary    {left}"));
-        }
-        watched
-            .summary
-            .lines()
-            .iter()
-            .for_each(|line| tell.say(format_args!("{line}")));
+        finished.tell(&tell, "summary    ");
         tell.say(format_args!("map        {}", outcome.quality.line()));
     }
-    match watched.judge()? {
+    match finished.judge(driven)? {
         End::Time => judge(moved),
         End::Asked => Ok(()),
     }
@@ -98,52 +91,36 @@ fn tell_parts(devices: &[Handle; 2], emulator: &Emulator, tell: &Tell) {
     ));
 }
 
-/// Waits for frames, activates, engages. `None` when somebody asked for the end before.
-fn drive(
-    options: &Demo,
-    link: &mut HostLink,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<Option<Watched>> {
-    if !wait_for_frames(link, interrupt)?
-        || !bridge::calibrated(link, tell, interrupt)?
-        || !bridge::activated(link, tell, interrupt)?
-    {
-        return Ok(None);
+/// Waits for frames, activates, engages.
+fn drive(options: &Demo, run: &mut Run, tell: &Tell) -> Result<End> {
+    let framed = run.wait(FRAME_WAIT, |seen| seen.glove_answers)?;
+    if run.asked() {
+        return Ok(End::Asked);
+    }
+    if !framed {
+        return Err(Failure::new(
+            format!(
+                "the virtual glove sent no frame in {} s",
+                FRAME_WAIT.as_secs()
+            ),
+            "the same on a machine with less to do",
+        )
+        .into());
+    }
+    if !run.calibrate(tell)? || !run.activate(tell)? {
+        return Ok(End::Asked);
     }
     tell.say(format_args!(
         "engaged    the gripper follows the hand for {} (Ctrl-C holds it and ends)",
         seconds(options.seconds)
     ));
-    let watch = Options {
+    run.drive(&Options {
         title: "gauntlet demo --on-chip",
         seconds: Some(options.seconds),
         engage: true,
+        drives: true,
         quiet: options.json,
-    };
-    Watch::new(link, interrupt)
-        .run(&watch, &mut |_| Ok(()))
-        .map(Some)
-}
-
-fn wait_for_frames(link: &mut HostLink, interrupt: &Interrupt) -> Result<bool> {
-    let end = Instant::now() + FRAME_WAIT;
-    while !link.status().map_err(Failure::from)?.glove_answers {
-        if Instant::now() >= end {
-            return Err(Failure::new(
-                format!(
-                    "the virtual glove sent no frame in {} s",
-                    FRAME_WAIT.as_secs()
-                ),
-                "the same on a machine with less to do",
-            )
-            .into());
-        }
-        if interrupt.sleep(PAUSE) {
-            return Ok(false);
-        }
-    }
-    Ok(true)
+    })
 }
 
 /// A demo in which the gripper did not move has failed, whatever was printed.

@@ -11,13 +11,13 @@ use rig::gripper::tcp::TcpHandle;
 use rig::gripper::{Family, VirtualGripper};
 use rig::pty::{Handle, PtyDevice};
 
-use super::gripper::Model;
 use crate::cli::Simulate;
 use crate::played;
 use crate::progress::Person;
 use crate::say;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
+use host::lines::Model;
 use host::lines::port::BAUD;
 use host::lines::tcp;
 use host::probe;
@@ -57,7 +57,7 @@ pub(super) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
         glove.answers(interrupt)?;
     }
     if let Some(device) = &gripper {
-        probe_gripper(&device.place(), model, interrupt)?;
+        probe::open_gripper(&device.place(), model, &Person, interrupt)?;
     }
     if !interrupt.asked() {
         say!("ready");
@@ -113,18 +113,12 @@ enum Simulated {
 
 impl Simulated {
     fn start(place: &Path, model: Model) -> Result<Self> {
-        let family = match model {
-            Model::ThreeFinger => Family::ThreeFinger,
-            Model::TwoFinger85 => Family::TwoFinger85,
-            Model::TwoFinger140 => Family::TwoFinger140,
-            Model::HandE => Family::HandE,
-        };
-        let device = VirtualGripper::new(rig::gripper::Config::of(family));
+        let device = VirtualGripper::new(rig::gripper::Config::of(family(model)));
         let Some(address) = tcp::Address::parse_to_listen(place)? else {
             return Ok(Self::Terminal(spawn(Box::new(device), place)?));
         };
         if model != Model::ThreeFinger {
-            return Err(super::gripper::only_three_finger_on_tcp().into());
+            return Err(probe::only_three_finger_on_tcp().into());
         }
         let at = (address.host.as_str(), address.port);
         let serve = || rig::gripper::tcp::serve(&device, at, &rig::Clock::system());
@@ -155,10 +149,13 @@ impl Simulated {
     }
 }
 
-fn probe_gripper(place: &Path, model: Model, interrupt: &Interrupt) -> Result<()> {
+/// The virtual device of a model.
+pub(super) fn family(model: Model) -> Family {
     match model {
-        Model::ThreeFinger => probe::open_gripper(place, &Person, interrupt).map(drop),
-        other => super::gripper::probe(place, other, interrupt),
+        Model::ThreeFinger => Family::ThreeFinger,
+        Model::TwoFinger85 => Family::TwoFinger85,
+        Model::TwoFinger140 => Family::TwoFinger140,
+        Model::HandE => Family::HandE,
     }
 }
 

@@ -4,14 +4,14 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
-use glove::hand::SEGMENT_COUNT;
+use glove::hand::{SEGMENT_COUNT, Side};
 use glove::scan::Health;
-use gripper::{Activation, Status};
+use gripper::Activation;
 use serde_json::json;
 
 use crate::cli::{Hand, Teleop};
 use crate::progress::Person;
-use crate::run::{Options, Run};
+use crate::run::{LogTo, Options, Run};
 use crate::tell::Tell;
 use crate::{out, outputs};
 use host::clock::Clock;
@@ -21,8 +21,7 @@ use host::interrupt::Interrupt;
 use host::lines::list;
 use host::lines::port::BAUD;
 use host::probe;
-use host::session::record::AXES;
-use host::session::{Order, Parts, Session, Snapshot};
+use host::session::{InProcess, Parts, Snapshot, check_image};
 use host::training::model;
 use host::words;
 
@@ -30,8 +29,6 @@ use host::words;
 const FRAME_WAIT: Duration = Duration::from_secs(15);
 /// For the others after the first that gives orientations.
 const STRAGGLERS: Duration = Duration::from_secs(2);
-/// An activation takes a few seconds; a gripper that needs longer has a fault.
-pub(super) const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
 
 /// Runs until its time is over or somebody ends it.
 ///
@@ -47,23 +44,24 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         )
         .into());
     }
-    check_model(options)?;
+    let model = options.gripper_model;
     let line = options.line.settings(&options.gripper)?;
     if let Some(path) = &options.log {
         outputs::check_new(path)?;
     }
     let image = model::weights(&options.model, None, &Person)?.image;
-    let config = config(options.hand)?;
+    check_image(&image, model)?;
     for path in [&options.glove, &options.gripper] {
         if let Some(warning) = list::latency_warning(path) {
             tell.say(format_args!("warning: {}: {warning}", path.display()));
         }
     }
-    let (gripper, status) = probe::open_gripper_with(&options.gripper, line, &Person, interrupt)?;
+    let (gripper, activation) =
+        probe::open_gripper_with(&options.gripper, model, line, &Person, interrupt)?;
     tell.say(format_args!(
         "gripper  {}  answers, {}",
         options.gripper.display(),
-        words::activation(status.activation)
+        words::activation(activation)
     ));
     let glove = probe::open_glove(&options.glove, interrupt)?;
     if glove.switched {
@@ -73,16 +71,20 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         ));
     }
     let clock = Clock::start();
+    let log = options.log.clone();
+    let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
     let parts = Parts {
         glove: glove.port,
         gripper,
+        model,
         line,
         image,
-        config,
+        side: side(options.hand),
+        feed,
     };
-    let session = Session::start(parts, clock, interrupt)?;
-    let mut run = Run::new(session, options.log.clone(), clock, interrupt.clone());
-    let prepared = prepare(options, &mut run, &tell, interrupt, status);
+    let session = InProcess::start(parts, clock, interrupt)?;
+    let mut run = Run::new(session, log, clock, interrupt.clone());
+    let prepared = prepare(options, &mut run, &tell, activation);
     let frames = !matches!(prepared, Ok(Prepared::NoFrames));
     let driven = match prepared {
         Ok(Prepared::Ready) => drive(options, &mut run),
@@ -124,34 +126,11 @@ fn check_ports(options: &Teleop) -> Result<()> {
     Ok(())
 }
 
-/// Only the 3-Finger gripper follows a glove for now.
-fn check_model(options: &Teleop) -> Result<()> {
-    let model = options.gripper_model;
-    if model.two_finger().is_none() {
-        return Ok(());
+fn side(hand: Hand) -> Side {
+    match hand {
+        Hand::Right => Side::Right,
+        Hand::Left => Side::Left,
     }
-    let what = format!(
-        "teleop drives the 3-Finger gripper only for now, not the {}",
-        model.name()
-    );
-    let next = format!(
-        "`gauntlet gripper move --gripper {} --gripper-model {} --to 100`, which moves it at a bench",
-        options.gripper.display(),
-        model.option()
-    );
-    Err(Failure::usage(what, next).into())
-}
-
-fn config(hand: Hand) -> Result<bridge::Config<AXES>> {
-    use glove::hand::Side;
-    let settings = bridge::Settings {
-        side: match hand {
-            Hand::Right => Side::Right,
-            Hand::Left => Side::Left,
-        },
-        ..bridge::Settings::default()
-    };
-    bridge::Config::new(settings).map_err(host::failure::told)
 }
 
 /// How the bring-up ended.
@@ -175,15 +154,14 @@ fn prepare(
     options: &Teleop,
     run: &mut Run,
     tell: &Tell,
-    interrupt: &Interrupt,
-    status: Status<AXES>,
+    activation: Activation,
 ) -> Result<Prepared> {
     tell.say(format_args!(
         "glove    {}  answers, bringing up its 16 sensors",
         options.glove.display()
     ));
     let framed = run.wait(FRAME_WAIT, |s| s.frame_sequence > 0)?;
-    if interrupt.asked() {
+    if run.asked() {
         return Ok(Prepared::Ended);
     }
     if !framed {
@@ -193,7 +171,7 @@ fn prepare(
     if options.calibrate_flat && !run.calibrate(tell)? {
         return Ok(Prepared::Ended);
     }
-    if status.activation == Activation::Ready {
+    if activation == Activation::Ready {
         return Ok(Prepared::Ready);
     }
     if options.activate
@@ -201,9 +179,9 @@ fn prepare(
             "The gripper is not activated. Activation moves its fingers. Type yes to activate it: ",
         )?
     {
-        return activate(run, tell, interrupt).map(Prepared::from);
+        return run.activate(tell).map(Prepared::from);
     }
-    if interrupt.asked() {
+    if run.asked() {
         return Ok(Prepared::Ended);
     }
     if options.engage {
@@ -211,7 +189,7 @@ fn prepare(
             format!(
                 "the gripper on {} is {}, so it cannot follow",
                 options.gripper.display(),
-                words::activation(status.activation)
+                words::activation(activation)
             ),
             "the same with --activate: the fingers will move",
         )
@@ -232,7 +210,7 @@ fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
     run.wait(2 * STRAGGLERS, |seen| {
         health(seen).is_some_and(|h| !h.contains(&Health::Starting))
     })?;
-    let seen = run.session().snapshot();
+    let seen = run.snapshot();
     let Some(health) = seen.as_ref().and_then(health).filter(|health| !all(health)) else {
         return Ok(());
     };
@@ -243,38 +221,6 @@ fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Activates the gripper and waits until it is ready. Returns whether to go on.
-pub(super) fn activate(run: &mut Run, tell: &Tell, interrupt: &Interrupt) -> Result<bool> {
-    tell.say(format_args!("activating the gripper: its fingers move"));
-    run.order(Order::Activate);
-    let ready = run.wait(ACTIVATION_WAIT, |s| {
-        s.status
-            .is_some_and(|status| status.activation == Activation::Ready)
-    })?;
-    if !ready && !interrupt.asked() {
-        let fault = run
-            .session()
-            .snapshot()
-            .and_then(|snapshot| snapshot.status)
-            .map_or_else(String::new, |status| {
-                format!(
-                    " (fault {:02X}: {})",
-                    status.fault.code(),
-                    status.fault.sentence()
-                )
-            });
-        return Err(Failure::new(
-            format!(
-                "the gripper was not ready {} s after its activation was asked for{fault}",
-                ACTIVATION_WAIT.as_secs()
-            ),
-            "take what blocks its fingers away, switch its 24 V supply off and on, and start again",
-        )
-        .into());
-    }
-    Ok(ready)
 }
 
 fn no_frames(path: &Path, interrupt: &Interrupt) -> anyhow::Error {
@@ -291,6 +237,7 @@ fn drive(options: &Teleop, run: &mut Run) -> Result<()> {
         title: "gauntlet teleop",
         seconds: options.seconds,
         engage: options.engage,
+        drives: true,
         quiet: options.json,
     })?;
     Ok(())

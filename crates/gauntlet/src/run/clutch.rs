@@ -7,33 +7,70 @@ use bridge::clutch::Position;
 use super::Run;
 use host::session::Order;
 
-/// After this long the bridge has seen that the clutch was closed.
-const CLUTCH_SETTLES: Duration = Duration::from_millis(500);
+/// After this long the bridge has seen that the clutch was closed, on a line that loses most of what is said, too.
+const CLUTCH_SETTLES: Duration = Duration::from_secs(2);
+
+/// The clutch as the person has it.
+#[derive(Debug, Default)]
+pub(super) struct Clutch {
+    /// Closed by a person, and not opened since.
+    pub closed: bool,
+    /// When it was closed last.
+    engaged: Option<Instant>,
+    /// The bridge has said so since.
+    seen_closed: bool,
+    /// It opened by itself, and nobody touched it since.
+    pub expired: bool,
+    pub heartbeat: Option<Instant>,
+}
+
+impl Clutch {
+    /// Whether it was ever closed here.
+    pub fn ours(&self) -> bool {
+        self.engaged.is_some()
+    }
+}
 
 impl Run {
     /// Closes the clutch: an act of a person.
     pub(super) fn engage(&mut self) {
-        let now = Instant::now();
-        (self.clutch, self.expired) = (true, false);
-        (self.engaged, self.heartbeat) = (Some(now), Some(now));
+        let now = Some(Instant::now());
+        self.clutch = Clutch {
+            closed: true,
+            engaged: now,
+            heartbeat: now,
+            ..Clutch::default()
+        };
         self.order(Order::Engage);
     }
 
     /// Opens the clutch, for a person.
     pub(super) fn release(&mut self) {
-        (self.clutch, self.expired) = (false, false);
+        (self.clutch.closed, self.clutch.expired) = (false, false);
         self.order(Order::Release);
     }
 
-    /// Sees that the clutch opened by itself.
+    /// Sees that the clutch opened by itself, or that somebody else opened it, which is an act.
     pub(super) fn look_at_clutch(&mut self) {
-        let settled = self.engaged.is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
-        let open = self
-            .session
-            .snapshot()
-            .is_some_and(|seen| matches!(seen.clutch, Position::Open | Position::Expired));
-        if self.clutch && settled && open {
-            (self.clutch, self.expired) = (false, true);
+        let clutch = &mut self.clutch;
+        let (true, Some(seen)) = (clutch.closed, self.session.snapshot()) else {
+            return;
+        };
+        match seen.clutch {
+            Position::Closed | Position::Lost => clutch.seen_closed = true,
+            Position::Open if clutch.seen_closed => clutch.closed = false,
+            Position::Expired if clutch.seen_closed => {
+                (clutch.closed, clutch.expired) = (false, true);
+            }
+            // The order to close it was too old when it came.
+            Position::Open | Position::Expired => {
+                let settled = clutch
+                    .engaged
+                    .is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
+                if settled {
+                    (clutch.closed, clutch.expired) = (false, true);
+                }
+            }
         }
     }
 }

@@ -8,13 +8,14 @@ use bridge::calibration::Try;
 use bridge::event::Kind;
 use glove::hand::{LIMITS, SEGMENT_COUNT};
 use glove::scan::{Finding, Health};
-use gripper::{Activation, Contact, Status};
+use gripper::{Activation, Contact};
 
-use super::replies::Replies;
 use crate::live::{Axis, Finger};
 use host::realtime::Scheduling;
 use host::session::Snapshot;
-use host::session::record::AXES;
+use host::session::axes::MOST;
+use host::session::replies::Replies;
+use host::session::snapshot::Status;
 use host::words;
 
 /// Faults shown at once.
@@ -34,7 +35,7 @@ pub(super) struct Shown {
     recent: VecDeque<(Instant, String, Kind)>,
     replies: Replies,
     /// Each axis' position, and when it changed last.
-    positions: [Option<(u8, Instant)>; AXES],
+    positions: [Option<(u8, Instant)>; MOST],
     /// Late steps as they were when they last grew.
     late: (u32, Option<Instant>),
 }
@@ -51,8 +52,12 @@ impl Shown {
     }
 
     /// A status came.
-    pub(super) fn status(&mut self, status: &Status<AXES>, now: Instant) {
-        for (known, position) in self.positions.iter_mut().zip(status.position) {
+    pub(super) fn status(&mut self, status: &Status, now: Instant) {
+        for (known, position) in self
+            .positions
+            .iter_mut()
+            .zip(status.position.iter().copied())
+        {
             if known.is_none_or(|(before, _)| before != position) {
                 *known = Some((position, now));
             }
@@ -63,12 +68,13 @@ impl Shown {
     pub(super) fn faults(
         &mut self,
         snapshot: &Snapshot,
-        scheduling: Scheduling,
+        scheduling: Option<Scheduling>,
         now: Instant,
     ) -> Vec<String> {
         let mut faults = standing(snapshot);
-        faults.extend(self.replies.look(now, &snapshot.counters.gripper));
-        faults.extend(self.busy(snapshot, scheduling, now));
+        let line = snapshot.line.as_ref();
+        faults.extend(line.and_then(|line| self.replies.look(now, line)));
+        faults.extend(scheduling.and_then(|known| self.busy(snapshot, known, now)));
         self.recent.retain(|(at, _, kind)| {
             now.saturating_duration_since(*at) < FAULT_SHOWN && !over(kind, snapshot)
         });
@@ -83,7 +89,7 @@ impl Shown {
         scheduling: Scheduling,
         now: Instant,
     ) -> Option<String> {
-        let steps = snapshot.counters.late_steps;
+        let steps = snapshot.late_steps;
         let (known, grew) = &mut self.late;
         if steps != *known {
             // What came late before anybody looked is no news.
@@ -107,11 +113,20 @@ impl Shown {
 
     /// The gripper's axes, and what each does.
     pub(super) fn axes(&self, snapshot: &Snapshot, now: Instant) -> Vec<Axis> {
-        (0..AXES)
-            .map(|axis| Axis {
-                name: words::AXIS_WORDS[axis],
-                asked: snapshot.command.map(|motion| motion.position[axis]),
-                reached: snapshot.status.map(|status| status.position[axis]),
+        let known = |axes: &host::session::axes::Axes<u8>| axes.len();
+        let reached = snapshot.status.as_ref().map(|status| &status.position);
+        let count = reached.or(snapshot.command.as_ref()).map_or(0, known);
+        words::axis_words(count)
+            .iter()
+            .take(count)
+            .enumerate()
+            .map(|(axis, name)| Axis {
+                name,
+                asked: snapshot
+                    .command
+                    .as_ref()
+                    .and_then(|asked| asked.get(axis).copied()),
+                reached: reached.and_then(|reached| reached.get(axis).copied()),
                 word: self.word(snapshot, axis, now),
             })
             .collect()
@@ -124,12 +139,13 @@ impl Shown {
         if gripper_age(snapshot).is_some() {
             return "silent, position old";
         }
-        let stands = self.positions[axis]
-            .is_none_or(|(_, since)| now.saturating_duration_since(since) >= STANDS);
-        match status.contact[axis] {
+        let known = self.positions.get(axis).copied().flatten();
+        let stands = known.is_none_or(|(_, since)| now.saturating_duration_since(since) >= STANDS);
+        match status.contact(axis) {
             // The gripper says so of an axis, too, that it was never told to move.
-            Contact::Moving if stands => "stands",
-            contact => words::contact(contact),
+            Some(Contact::Moving) if stands => "stands",
+            Some(contact) => words::contact(contact),
+            None => "",
         }
     }
 }
@@ -154,26 +170,6 @@ fn old(us: u64) -> Option<f32> {
     (us >= OLD_US).then_some(us as f32 / 1e6)
 }
 
-/// The sensors that are not used, by name, with what is wrong with them.
-fn unused_sensors(snapshot: &Snapshot) -> Vec<String> {
-    let mut unused = Vec::new();
-    if let Some(frame) = &snapshot.frame {
-        let health = frame.samples.map(|sample| sample.health);
-        unused.extend(words::lost_sensors(&health));
-    }
-    unused.extend(words::distrusted_sensors(snapshot.distrusted));
-    unused
-}
-
-/// Why the newest frames could not be used.
-pub(super) fn why_useless(snapshot: &Snapshot) -> String {
-    let unused = unused_sensors(snapshot);
-    if unused.is_empty() {
-        return "their joint angles are no numbers".to_owned();
-    }
-    unused.join("; ")
-}
-
 /// Whether the reason of a fault is gone.
 fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
     match kind {
@@ -196,10 +192,14 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
 }
 
 fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
-    snapshot.frame.as_ref().is_some_and(|frame| {
-        let sample = frame.samples.get(segment);
-        sample.is_some_and(|sample| sample.health == Health::Good)
-    })
+    match &snapshot.frame {
+        Some(frame) => {
+            let sample = frame.samples.get(segment);
+            sample.is_some_and(|sample| sample.health == Health::Good)
+        }
+        // A chip does not tell.
+        None => snapshot.line.is_none(),
+    }
 }
 
 /// What is wrong now and stays so.
@@ -218,19 +218,23 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
     if snapshot.calibration.newest == Try::Waiting {
         faults.push(Kind::Calibration(Try::Waiting).to_string());
     }
-    faults.extend(unused_sensors(snapshot));
+    faults.extend(snapshot.unused_sensors());
+    if snapshot.line.is_none() {
+        // Of a bridge on a chip no events come.
+        let silent = |answers: bool, what: &str| (!answers).then(|| what.to_owned());
+        faults.extend(silent(snapshot.glove_answers, "the glove sends no frames"));
+        faults.extend(silent(
+            snapshot.gripper_answers,
+            "the gripper does not answer",
+        ));
+    }
     if let Some(axis) = snapshot.stands {
         let kind = Kind::AxisStands { axis };
         faults.push(kind.to_string());
     }
     if let Some(status) = &snapshot.status {
         if status.fault != gripper::Fault::None {
-            faults.push(format!(
-                "gripper fault {:02X}: {}; {}",
-                status.fault.code(),
-                status.fault.sentence(),
-                status.fault.action()
-            ));
+            faults.push(words::fault(status.fault));
         }
         if status.activation != Activation::Ready {
             faults.push(format!(

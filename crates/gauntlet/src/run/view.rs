@@ -11,7 +11,7 @@ use host::session::Snapshot;
 impl Run {
     pub(super) fn view(&mut self, options: &Options, elapsed: Duration, keys: bool) -> View {
         let snapshot = self.session.snapshot();
-        let now = self.clock.now();
+        let progress = self.session.hub().progress();
         let mut view = View {
             title: options.title.to_owned(),
             elapsed,
@@ -22,21 +22,24 @@ impl Run {
             hand_age: None,
             axes: Vec::new(),
             gripper_age: None,
-            frames_per_s: self.numbers.frames.now(now.as_ticks()),
-            cycles_per_s: self.numbers.cycles.now(now.as_ticks()),
-            latency_p50: self.numbers.latency.at(0.5),
-            latency_p99: self.numbers.latency.at(0.99),
-            dropped: self.numbers.dropped(),
+            frames_per_s: progress.frames_per_s,
+            cycles_per_s: progress.cycles_per_s,
+            latency_p50: progress.latency_p50,
+            latency_p99: progress.latency_p99,
+            dropped: progress.dropped,
             faults: self.faults_now(snapshot.as_ref()),
-            fault_count: self.numbers.faults(),
-            keys: if keys {
-                "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
-            } else {
-                "Ctrl-C: hold and end"
+            fault_count: progress.faults,
+            keys: match (keys, options.drives) {
+                (true, true) => {
+                    "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
+                }
+                (true, false) => "q: end",
+                (false, true) => "Ctrl-C: hold and end",
+                (false, false) => "Ctrl-C: end",
             },
         };
         if let Some(snapshot) = &snapshot {
-            view.state = self.state_words(snapshot, keys);
+            view.state = self.state_words(snapshot, keys && options.drives);
             view.following = snapshot.state.is_moving();
             view.fingers = shown::fingers(snapshot);
             view.hand_age = shown::glove_age(snapshot);
@@ -49,7 +52,7 @@ impl Run {
     /// The state, and what a person can do about it.
     fn state_words(&self, snapshot: &Snapshot, keys: bool) -> String {
         let name = snapshot.state.name();
-        if keys && !self.clutch {
+        if keys && !self.clutch.closed {
             match snapshot.clutch {
                 Position::Open => return format!("{name}: space closes the clutch"),
                 Position::Expired => return format!("{name}: space closes the clutch again"),
@@ -61,7 +64,7 @@ impl Run {
 
     fn faults_now(&mut self, snapshot: Option<&Snapshot>) -> Vec<String> {
         let mut faults = Vec::new();
-        for (port, device) in self.session.ports().iter().zip(["glove", "gripper"]) {
+        for (device, port) in self.session.ports() {
             if !port.plugged() {
                 faults.push(format!(
                     "{device}: {} is unplugged, waiting for it to come back",
@@ -70,7 +73,7 @@ impl Run {
             }
         }
         faults.extend(self.log_end());
-        if self.expired {
+        if self.clutch.expired {
             faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
         }
         if let Some(snapshot) = snapshot {

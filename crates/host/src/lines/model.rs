@@ -24,6 +24,14 @@ impl Model {
         Self::HandE,
     ];
 
+    /// Its axes: 4, or 1.
+    pub fn axes(self) -> usize {
+        match self {
+            Self::ThreeFinger => gripper::space::AXES,
+            Self::TwoFinger85 | Self::TwoFinger140 | Self::HandE => 1,
+        }
+    }
+
     /// The maker's name for it.
     pub fn name(self) -> &'static str {
         match self.two_finger() {
@@ -39,14 +47,6 @@ impl Model {
             Self::TwoFinger85 => "2f85",
             Self::TwoFinger140 => "2f140",
             Self::HandE => "hande",
-        }
-    }
-
-    /// Axes that are told where to go.
-    pub fn axes(self) -> usize {
-        match self.two_finger() {
-            None => gripper::space::AXES,
-            Some(_) => 1,
         }
     }
 

@@ -1,10 +1,11 @@
 //! The channels of a session log: topics, schemas, and how a record becomes messages.
 
 use glove::hand::{JOINT_NAMES, SEGMENT_NAMES};
-use gripper::Status;
 use serde_json::{Map, Value, json};
+use trainer::hand::Space;
 
-use crate::session::record::{AXES, AXIS_NAMES, Command, Frame, Record, Sort};
+use crate::session::record::{AXES, Command, Frame, Record, Sort};
+use crate::session::snapshot::Status;
 use crate::words;
 
 /// Index into [`CHANNELS`].
@@ -22,7 +23,8 @@ pub(super) enum Channel {
 pub(super) struct Description {
     pub topic: &'static str,
     pub schema_name: &'static str,
-    pub schema: fn() -> Value,
+    /// By the gripper's number of axes.
+    pub schema: fn(usize) -> Value,
 }
 
 /// In the order of [`Channel`].
@@ -59,8 +61,13 @@ pub(super) const CHANNELS: [Description; 6] = [
     },
 ];
 
-/// Robotiq's letters of the axes, in the order of the positions.
+/// Robotiq's letters of the axes, in the order of the positions; a 2-Finger gripper's only one has finger A's place.
 const LETTERS: [char; AXES] = ['A', 'B', 'C', 'S'];
+
+/// The axes' names of a gripper with so many.
+fn axis_names(axes: usize) -> &'static [&'static str] {
+    Space::of_axes(axes).map_or(&[], Space::axis_names)
+}
 
 /// The messages of one record.
 pub(super) fn messages(record: &Record) -> Vec<(Channel, Value)> {
@@ -110,7 +117,7 @@ fn frame_messages(frame: &Frame) -> Vec<(Channel, Value)> {
             json!({
                 "time_us": time,
                 "sequence": frame.sequence,
-                "counts": named(&AXIS_NAMES, output),
+                "counts": named(axis_names(output.len()), output),
             }),
         ));
     }
@@ -129,7 +136,11 @@ fn command_message(command: &Command) -> Value {
     let mut fields = Map::new();
     fields.insert("time_us".to_owned(), json!(command.at.as_ticks()));
     fields.insert("age_us".to_owned(), json!(command.age_us));
-    for (axis, letter) in LETTERS.iter().enumerate() {
+    for (axis, letter) in LETTERS
+        .iter()
+        .enumerate()
+        .take(command.motion.position.len())
+    {
         for (field, values) in [
             ("rPR", &command.motion.position),
             ("rSP", &command.motion.speed),
@@ -141,27 +152,26 @@ fn command_message(command: &Command) -> Value {
     Value::Object(fields)
 }
 
-fn status_message(status: &Status<AXES>) -> Value {
+fn status_message(status: &Status) -> Value {
     let mut fields = Map::new();
+    let more = status.more.as_ref();
     fields.insert("time_us".to_owned(), json!(status.stamp.as_ticks()));
     fields.insert(
         "gIMC".to_owned(),
         json!(words::activation_code(status.activation)),
     );
-    fields.insert("gGTO".to_owned(), json!(u8::from(status.going_to)));
-    fields.insert("gFLT".to_owned(), json!(words::fault_code(status)));
-    for (axis, letter) in LETTERS.iter().enumerate() {
-        let contact = status
-            .contact
-            .get(axis)
-            .map(|contact| words::contact_code(*contact));
+    let going_to = more.map(|more| u8::from(more.going_to));
+    fields.insert("gGTO".to_owned(), json!(going_to));
+    fields.insert("gFLT".to_owned(), json!(status.fault.code()));
+    for (axis, letter) in LETTERS.iter().enumerate().take(status.position.len()) {
+        let contact = status.contact(axis).map(words::contact_code);
         fields.insert(format!("gDT{letter}"), json!(contact));
-        for (field, values) in [
-            ("gPR", &status.echo),
-            ("gPO", &status.position),
-            ("gCU", &status.current),
+        for (field, value) in [
+            ("gPR", status.echo.get(axis)),
+            ("gPO", status.position.get(axis)),
+            ("gCU", more.and_then(|more| more.current.get(axis))),
         ] {
-            fields.insert(format!("{field}{letter}"), json!(values.get(axis)));
+            fields.insert(format!("{field}{letter}"), json!(value));
         }
     }
     Value::Object(fields)
@@ -198,7 +208,7 @@ fn numbers(names: &[&str], unit: &str) -> Value {
     object(unit, names.iter().map(|name| field(name, "number", unit)))
 }
 
-fn imu_schema() -> Value {
+fn imu_schema(_: usize) -> Value {
     let sensor = object(
         "one sensor",
         [
@@ -227,7 +237,7 @@ fn imu_schema() -> Value {
     )
 }
 
-fn angles_schema() -> Value {
+fn angles_schema(_: usize) -> Value {
     object(
         "the joint angles of one scan",
         [
@@ -243,7 +253,7 @@ fn angles_schema() -> Value {
     )
 }
 
-fn output_schema() -> Value {
+fn output_schema(axes: usize) -> Value {
     object(
         "what the map makes of one scan, before filter, limits and rate",
         [
@@ -251,13 +261,13 @@ fn output_schema() -> Value {
             sequence_field(),
             (
                 "counts".to_owned(),
-                numbers(&AXIS_NAMES, "counts, 0 open to 255 closed"),
+                numbers(axis_names(axes), "counts, 0 open to 255 closed"),
             ),
         ],
     )
 }
 
-fn command_schema() -> Value {
+fn command_schema(axes: usize) -> Value {
     let age = (
         "age_us".to_owned(),
         json!({
@@ -265,7 +275,7 @@ fn command_schema() -> Value {
             "description": "age of the oldest sample it rests on when it left; null for a hold",
         }),
     );
-    let axes = LETTERS.iter().flat_map(|letter| {
+    let axes = LETTERS.iter().take(axes).flat_map(|letter| {
         [
             field(
                 &format!("rPR{letter}"),
@@ -286,8 +296,8 @@ fn command_schema() -> Value {
     )
 }
 
-fn status_schema() -> Value {
-    let axes = LETTERS.iter().flat_map(|letter| {
+fn status_schema(axes: usize) -> Value {
+    let axes = LETTERS.iter().take(axes).flat_map(|letter| {
         [
             field(
                 &format!("gDT{letter}"),
@@ -328,7 +338,7 @@ fn status_schema() -> Value {
     )
 }
 
-fn event_schema() -> Value {
+fn event_schema(_: usize) -> Value {
     object(
         "something that happened",
         [

@@ -3,6 +3,7 @@
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
@@ -18,10 +19,12 @@ use crate::session::record::Record;
 
 /// Bytes to a chunk at most; most are closed by time.
 const CHUNK: u64 = 1 << 20;
-/// Records of the bring-up to a chunk.
+/// Records to a chunk at most: those of the bring-up come all at once.
 const RECORDS: usize = 128;
 /// Pause between two closed chunks: a program that is killed loses no more.
 const CLOSE_EVERY: Duration = Duration::from_millis(500);
+/// Pause between two looks whether the log is to end.
+const LOOK: Duration = Duration::from_millis(50);
 /// Pause between two requests to the system to put it on the disk: a power cut loses little more.
 const SYNC_EVERY: Duration = Duration::from_secs(2);
 
@@ -85,11 +88,12 @@ impl LogFile {
     /// Creates the file; never over one that is there. `fault` is told what ends it.
     pub(super) fn create(
         path: &Path,
+        axes: usize,
         clock: Clock,
         fault: Arc<OnceLock<String>>,
     ) -> anyhow::Result<Self> {
         let file = File::create_new(path)?;
-        let log = Self::start(file, clock, fault);
+        let log = Self::start(file, axes, clock, fault);
         if log.is_err() {
             // Nothing is in it: it would only be in the way of the next try.
             let _ = std::fs::remove_file(path);
@@ -97,7 +101,12 @@ impl LogFile {
         log
     }
 
-    fn start(file: File, clock: Clock, fault: Arc<OnceLock<String>>) -> anyhow::Result<Self> {
+    fn start(
+        file: File,
+        axes: usize,
+        clock: Clock,
+        fault: Arc<OnceLock<String>>,
+    ) -> anyhow::Result<Self> {
         let sink = Sink {
             file: file.try_clone()?,
             failed: false,
@@ -114,7 +123,7 @@ impl LogFile {
             let schema = writer.add_schema(
                 channel.schema_name,
                 "jsonschema",
-                (channel.schema)().to_string().as_bytes(),
+                (channel.schema)(axes).to_string().as_bytes(),
             )?;
             *id = writer.add_channel(schema, channel.topic, "json", &Default::default())?;
         }
@@ -133,34 +142,40 @@ impl LogFile {
         Ok(log)
     }
 
-    /// Writes `early`, then what comes, until nothing can come any more or the file takes nothing.
-    pub(super) fn write_all(&mut self, early: Vec<Record>, records: &Receiver<Record>) {
-        let result = self.write_until_end(early, records);
+    /// Writes what comes, until nothing can come any more, or `closing` is set and what waited is written, or the file takes
+    /// nothing.
+    pub(super) fn write_all(&mut self, records: &Receiver<Record>, closing: &AtomicBool) {
+        let result = self.write_until_end(records, closing);
         self.note(&result);
     }
 
     fn write_until_end(
         &mut self,
-        early: Vec<Record>,
         records: &Receiver<Record>,
+        closing: &AtomicBool,
     ) -> McapResult<()> {
-        for part in early.chunks(RECORDS) {
-            for record in part {
-                self.write(record)?;
-            }
-            self.close_chunk()?;
-        }
         let mut close = Instant::now() + CLOSE_EVERY;
         let mut sync = Instant::now() + SYNC_EVERY;
+        let mut waiting = 0;
         loop {
-            match records.recv_timeout(close.saturating_duration_since(Instant::now())) {
-                Ok(record) => self.write(&record)?,
+            let ends = closing.load(Ordering::Relaxed);
+            let wait = match ends {
+                true => Duration::ZERO,
+                false => LOOK.min(close.saturating_duration_since(Instant::now())),
+            };
+            match records.recv_timeout(wait) {
+                Ok(record) => {
+                    self.write(&record)?;
+                    waiting += 1;
+                }
+                Err(RecvTimeoutError::Timeout) if ends => return Ok(()),
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
             }
             let now = Instant::now();
-            if now >= close {
+            if now >= close || waiting >= RECORDS {
                 self.close_chunk()?;
+                waiting = 0;
                 close = now + CLOSE_EVERY;
             }
             if now >= sync {

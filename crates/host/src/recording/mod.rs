@@ -2,7 +2,7 @@
 //!
 //! Six channels, JSON with a JSON schema each: `/glove/imu`, `/glove/joint_angles`, `/map/output`, `/gripper/command`
 //! (field names rPRA, rSPA, …), `/gripper/status` (gPOA, …), `/events`. `docs/session-log.md` lists the fields. The file
-//! is written by a thread of its own behind a bounded queue, so that a slow disk never slows the loop; what does not fit
+//! is written by a thread of its own, which the bridge's thread feeds through a bounded queue, so that a slow disk never slows the loop; what does not fit
 //! is counted and said. Every half second a chunk is closed: whatever ends the program, the file can be read from its
 //! start until then. A disk that takes no more ends the log and nothing else; [`SessionLog::fault`] says so at once, and
 //! the file ends after the last whole chunk.
@@ -11,7 +11,7 @@ mod channels;
 mod file;
 
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread::JoinHandle;
 use std::time::Duration;
@@ -21,11 +21,11 @@ use serde::{Serialize, Serializer};
 
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
-use crate::session::record::Record;
+use crate::session::record::Records;
 use file::{LogFile, Whole};
 
-/// Records that may wait for the disk: about 15 s of a run.
-const QUEUE: usize = 4096;
+/// Records that may wait for the disk, or for the file to be made: more than a minute of a run.
+pub const QUEUE: usize = 16_384;
 
 const NEXT_STEP: &str = "another name in a folder with room and permission to write";
 
@@ -33,10 +33,10 @@ const NEXT_STEP: &str = "another name in a folder with room and permission to wr
 #[derive(Debug)]
 pub struct SessionLog {
     path: PathBuf,
-    sender: Option<SyncSender<Record>>,
     writer: Option<JoinHandle<Whole>>,
     fault: Arc<OnceLock<String>>,
-    lost: u64,
+    closing: Arc<AtomicBool>,
+    lost: Arc<AtomicU64>,
 }
 
 /// What a finished log holds.
@@ -91,38 +91,31 @@ impl Written {
 }
 
 impl SessionLog {
-    /// Creates the file at `path`, never over one that is there, with the records `early` at its start.
+    /// Creates the file at `path`, never over one that is there, for `records`, those that wait already at its start.
     ///
     /// # Errors
     /// A failure that names the path.
-    pub fn create(path: &Path, clock: Clock, early: Vec<Record>) -> Result<Self> {
+    pub fn create(path: &Path, axes: usize, clock: Clock, records: Records) -> Result<Self> {
         let what = || format!("the session log {} cannot be written", path.display());
         let fault = Arc::new(OnceLock::new());
-        let mut file = LogFile::create(path, clock, Arc::clone(&fault)).or_fail(what, NEXT_STEP)?;
-        let (sender, receiver) = sync_channel(QUEUE);
+        let mut file =
+            LogFile::create(path, axes, clock, Arc::clone(&fault)).or_fail(what, NEXT_STEP)?;
+        let closing = Arc::new(AtomicBool::new(false));
+        let (lost, closed) = (records.lost(), Arc::clone(&closing));
         let writer = std::thread::Builder::new()
             .name("session log".to_owned())
             .spawn(move || {
-                file.write_all(early, &receiver);
+                file.write_all(&records.records, &closed);
                 file.finish()
             })
             .or_fail(what, "ending other programs")?;
         Ok(Self {
             path: path.to_owned(),
-            sender: Some(sender),
             writer: Some(writer),
             fault,
-            lost: 0,
+            closing,
+            lost,
         })
-    }
-
-    /// Takes one record. Never waits: with the queue full it is counted as lost.
-    pub fn take(&mut self, record: Record) {
-        let Some(sender) = &self.sender else { return };
-        // A writer that ended said why.
-        if let Err(TrySendError::Full(_)) = sender.try_send(record) {
-            self.lost += 1;
-        }
     }
 
     /// Why nothing is written any more, where that is so.
@@ -142,13 +135,13 @@ impl SessionLog {
             path: self.path.clone(),
             messages: whole.messages,
             covers: whole.covers(),
-            lost: self.lost,
+            lost: self.lost.load(Ordering::Relaxed),
             fault: self.fault.get().cloned(),
         }
     }
 
     fn join(&mut self) -> Whole {
-        drop(self.sender.take());
+        self.closing.store(true, Ordering::Relaxed);
         match self.writer.take().map(JoinHandle::join) {
             Some(Ok(whole)) => whole,
             Some(Err(_)) => {

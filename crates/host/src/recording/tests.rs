@@ -5,7 +5,7 @@ use gripper::{Activation, Contact, Fault, Instant, Motion, Status};
 use serde_json::Value;
 
 use super::*;
-use crate::session::record::{Command, Frame, Imu};
+use crate::session::record::{Command, Feed, Frame, Imu, Record, queue};
 
 fn at(us: u64) -> Instant {
     Instant::from_ticks(us)
@@ -23,7 +23,7 @@ fn frame(sequence: u32) -> Record {
         imus: [imu; SEGMENT_COUNT],
         angles: core::array::from_fn::<f32, JOINT_COUNT, _>(|joint| joint as f32 / 10.0),
         angles_valid: true,
-        map_output: (sequence > 0).then_some([0.1, 254.7, 127.0, 64.0]),
+        map_output: (sequence > 0).then_some([0.1, 254.7, 127.0, 64.0].into()),
         following: false,
     }))
 }
@@ -44,21 +44,39 @@ fn records() -> Vec<Record> {
                 position: [1, 2, 3, 4],
                 speed: [255; 4],
                 force: [64; 4],
-            },
+            }
+            .into(),
             age_us: Some(31_000),
             first: true,
         }),
-        Record::Status(Status {
-            stamp: at(40),
-            activation: Activation::Ready,
-            going_to: true,
-            contact: [Contact::ContactClosing; 4],
-            echo: [1, 2, 3, 4],
-            position: [5, 6, 7, 8],
-            current: [9; 4],
-            fault: Fault::None,
-        }),
+        Record::Status(
+            Status {
+                stamp: at(40),
+                activation: Activation::Ready,
+                going_to: true,
+                contact: [Contact::ContactClosing; 4],
+                echo: [1, 2, 3, 4],
+                position: [5, 6, 7, 8],
+                current: [9; 4],
+                fault: Fault::None,
+            }
+            .into(),
+        ),
     ]
+}
+
+/// A log for a gripper of four axes, and the session's end of its queue.
+fn log(path: &Path, records: impl IntoIterator<Item = Record>) -> (SessionLog, Feed) {
+    let (feed, waiting) = queue(QUEUE);
+    records.into_iter().for_each(|record| feed.hand(record));
+    (
+        SessionLog::create(path, 4, Clock::start(), waiting).unwrap(),
+        feed,
+    )
+}
+
+fn refused(path: &Path) -> anyhow::Error {
+    SessionLog::create(path, 4, Clock::start(), queue(QUEUE).1).unwrap_err()
 }
 
 /// Topic → messages, read back with the field's own reader.
@@ -87,9 +105,9 @@ fn every_record_is_in_the_log_once_under_its_topic() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
     let mut late = records();
-    let early = late.drain(..2).collect();
-    let mut log = SessionLog::create(&path, Clock::start(), early).unwrap();
-    late.into_iter().for_each(|record| log.take(record));
+    let early: Vec<Record> = late.drain(..2).collect();
+    let (log, feed) = log(&path, early);
+    late.into_iter().for_each(|record| feed.hand(record));
     let written = log.finish();
     assert_eq!((written.messages, written.lost), (8, 0));
 
@@ -122,8 +140,7 @@ fn every_record_is_in_the_log_once_under_its_topic() {
 fn numbers_come_back_bit_for_bit() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut log = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap();
-    log.take(frame(1));
+    let (log, _feed) = log(&path, [frame(1)]);
     log.finish();
     let found = read_back(&path);
     let angle = found["/glove/joint_angles"][0]["angles"]["thumb_cmc_abd"]
@@ -136,8 +153,7 @@ fn numbers_come_back_bit_for_bit() {
 fn a_log_dropped_without_finish_is_still_whole() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut log = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap();
-    log.take(frame(0));
+    let (log, _feed) = log(&path, [frame(0)]);
     drop(log);
     assert!(
         mcap::Summary::read(&std::fs::read(&path).unwrap())
@@ -149,8 +165,7 @@ fn a_log_dropped_without_finish_is_still_whole() {
 
 #[test]
 fn a_folder_that_does_not_exist_is_named() {
-    let error =
-        SessionLog::create(Path::new("/nowhere/run.mcap"), Clock::start(), Vec::new()).unwrap_err();
+    let error = refused(Path::new("/nowhere/run.mcap"));
     assert!(error.to_string().contains("/nowhere/run.mcap"), "{error}");
 }
 
@@ -160,7 +175,7 @@ fn a_file_that_is_there_is_never_written_over_not_even_an_empty_one() {
     let path = folder.path().join("run.mcap");
     for content in ["precious", ""] {
         std::fs::write(&path, content).unwrap();
-        let error = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap_err();
+        let error = refused(&path);
         assert!(error.to_string().contains("run.mcap"), "{error}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), content);
     }
@@ -170,8 +185,7 @@ fn a_file_that_is_there_is_never_written_over_not_even_an_empty_one() {
 fn while_a_log_is_written_all_but_its_last_second_can_be_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
-    let mut log = SessionLog::create(&path, Clock::start(), Vec::new()).unwrap();
-    log.take(frame(1));
+    let (log, _feed) = log(&path, [frame(1)]);
     let end = std::time::Instant::now() + Duration::from_secs(10);
     // Whole chunks from the start, as a reader takes them from the file of a program that was killed.
     let readable = || {

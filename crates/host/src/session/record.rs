@@ -4,9 +4,15 @@ use bridge::event::Kind;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::Health;
 use gripper::Instant;
-use gripper::{Motion, Status};
 
-/// Axes of the gripper the tool drives: the 3-Finger's fingers A, B, C and the scissor.
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+
+use super::axes::Axes;
+use super::snapshot::{Motion, Status};
+
+/// Axes of the 3-Finger gripper: its fingers A, B, C and the scissor.
 pub const AXES: usize = 4;
 
 /// Their names, in files and views.
@@ -37,7 +43,7 @@ pub struct Frame {
     /// Whether they are usable.
     pub angles_valid: bool,
     /// What the map makes of them, counts; `None` where it was not asked.
-    pub map_output: Option<[f32; AXES]>,
+    pub map_output: Option<Axes<f32>>,
     /// Whether the gripper follows the hand, so that a command must rest on this frame.
     pub following: bool,
 }
@@ -48,7 +54,7 @@ pub struct Command {
     /// When it was handed to the port.
     pub at: Instant,
     /// Positions, speeds, forces.
-    pub motion: Motion<AXES>,
+    pub motion: Motion,
     /// Age of the oldest sample it rests on, µs; `None` for a hold, which rests on none.
     pub age_us: Option<u64>,
     /// Whether it is the first one that rests on that sample: its age is the latency of that frame.
@@ -72,7 +78,7 @@ pub enum Record {
     /// A command.
     Command(Command),
     /// A status of the gripper.
-    Status(Status<AXES>),
+    Status(Status),
     /// Something that happened, in words.
     Event {
         /// When.
@@ -95,5 +101,48 @@ impl Record {
             Self::Status(status) => status.stamp,
             Self::Event { at, .. } => *at,
         }
+    }
+}
+
+/// Both ends of a queue for so many records, from a session's thread to whoever keeps them.
+pub fn queue(capacity: usize) -> (Feed, Records) {
+    let (sender, records) = sync_channel(capacity);
+    let lost = Arc::new(AtomicU64::new(0));
+    let feed = Feed {
+        sender,
+        lost: Arc::clone(&lost),
+    };
+    (feed, Records { records, lost })
+}
+
+/// The session's end.
+#[derive(Debug)]
+pub struct Feed {
+    sender: SyncSender<Record>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Feed {
+    /// Hands one over. Never waits: with the queue full it is counted as lost.
+    pub fn hand(&self, record: Record) {
+        // A keeper that ended said why.
+        if let Err(TrySendError::Full(_)) = self.sender.try_send(record) {
+            self.lost.fetch_add(1, Ordering::Relaxed);
+        }
+    }
+}
+
+/// The keeper's end.
+#[derive(Debug)]
+pub struct Records {
+    /// The records, in order.
+    pub records: Receiver<Record>,
+    lost: Arc<AtomicU64>,
+}
+
+impl Records {
+    /// Counts records that did not fit, also after the queue is gone.
+    pub fn lost(&self) -> Arc<AtomicU64> {
+        Arc::clone(&self.lost)
     }
 }

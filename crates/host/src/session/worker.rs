@@ -1,37 +1,36 @@
 //! The bridge's thread: takes the orders, hands over what happened, and ends with a hold.
 
-use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TryRecvError};
-use std::sync::{Arc, Mutex};
-
 use bridge::calibration::Try;
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
-use bridge::timing::{HEARTBEAT_TIMEOUT, is_within};
-use bridge::{Epoch, HoldReason, Platform, State, Telemetry};
-use gripper::{Activation, Instant, Status};
+use bridge::{Epoch, HoldReason, State, Telemetry};
+use gripper::{Activation, Gripper, Instant, Status};
 
-use super::{Given, Order, PcApp, Snapshot, lock};
-use crate::session::record::{AXES, Command, Frame, Imu, Record, Sort};
-use crate::session::stopped::{HOLD_WAIT, Stopped};
+use super::hub::{Happened, Hub, Said, Totals};
+use super::in_process::PcApp;
+use super::orders::{Order, Queue};
+use super::record::{Command, Feed, Frame, Imu, Record, Sort};
+use super::snapshot::Snapshot;
+use super::stopped::{HOLD_WAIT, Stopped};
+use crate::realtime::Scheduling;
 
-/// The thread's side of the queues.
+/// The thread's side of a session in this process.
 pub(super) struct Worker {
-    pub orders: Receiver<Given>,
+    orders: Queue,
+    hub: Hub,
+    feed: Option<Feed>,
+    pub scheduling: Scheduling,
     /// Of the newest closing of the clutch.
-    pub epoch: Option<Epoch>,
-    pub records: SyncSender<Record>,
-    pub snapshot: Arc<Mutex<Option<Snapshot>>>,
-    pub lost: Arc<AtomicU64>,
-    pub seen: Seen,
+    epoch: Option<Epoch>,
+    seen: Seen,
     /// When the hold was ordered.
-    pub ending: Option<Instant>,
-    pub activation_asked: bool,
+    ending: Option<Instant>,
+    activation_asked: bool,
 }
 
 /// The sequence numbers already handed over.
 #[derive(Default)]
-pub(super) struct Seen {
+struct Seen {
     frame: u32,
     sent: u32,
     status: u32,
@@ -40,7 +39,20 @@ pub(super) struct Seen {
 }
 
 impl Worker {
-    pub fn run(mut self, app: &mut PcApp) -> Stopped {
+    pub fn new(orders: Queue, hub: Hub, feed: Option<Feed>) -> Self {
+        Self {
+            orders,
+            hub,
+            feed,
+            scheduling: Scheduling::Shared,
+            epoch: None,
+            seen: Seen::default(),
+            ending: None,
+            activation_asked: false,
+        }
+    }
+
+    pub fn run<R: Gripper<X>, const X: usize>(mut self, app: &mut PcApp<R, X>) -> Stopped {
         let mut stopped = Stopped::NotConfirmed;
         app.run(|app| {
             self.obey(app);
@@ -54,46 +66,29 @@ impl Worker {
         stopped
     }
 
-    fn obey(&mut self, app: &mut PcApp) {
-        loop {
-            match self.orders.try_recv() {
-                // Whoever gave orders is gone: the same as a stop.
-                Ok(Given {
-                    order: Order::Stop, ..
-                })
-                | Err(TryRecvError::Disconnected) => return self.end(app),
-                Ok(given) => self.obey_one(app, given),
-                Err(TryRecvError::Empty) => return,
-            }
-        }
-    }
-
-    fn obey_one(&mut self, app: &mut PcApp, given: Given) {
-        let now = app.platform_mut().now();
-        let old = !is_within(now, given.at, HEARTBEAT_TIMEOUT);
-        if given.order.moves() && (old || self.ending.is_some()) {
-            return;
-        }
-        match given.order {
-            Order::Engage => self.epoch = Some(app.engage()),
-            Order::Heartbeat => {
-                if let Some(epoch) = self.epoch {
-                    // Refused where the clutch is open; telemetry tells so.
-                    let _ = app.heartbeat(epoch);
+    fn obey<R: Gripper<X>, const X: usize>(&mut self, app: &mut PcApp<R, X>) {
+        while let Some(order) = self.orders.next() {
+            match order {
+                Order::Engage => self.epoch = Some(app.engage()),
+                Order::Heartbeat => {
+                    if let Some(epoch) = self.epoch {
+                        // Refused where the clutch is open; telemetry tells so.
+                        let _ = app.heartbeat(epoch);
+                    }
                 }
+                Order::Release => app.release(),
+                Order::Activate => {
+                    self.activation_asked = true;
+                    app.activate();
+                }
+                Order::Calibrate(wait) => app.calibrate_flat_hand_within(wait),
+                Order::UndoCalibration => app.undo_calibration(),
+                Order::Stop => return self.end(app),
             }
-            Order::Release => app.release(),
-            Order::Activate => {
-                self.activation_asked = true;
-                app.activate();
-            }
-            Order::Calibrate(wait) => app.calibrate_flat_hand_within(wait),
-            Order::UndoCalibration => app.undo_calibration(),
-            Order::Stop => self.end(app),
         }
     }
 
-    fn end(&mut self, app: &mut PcApp) {
+    fn end<R: Gripper<X>, const X: usize>(&mut self, app: &mut PcApp<R, X>) {
         if self.ending.is_none() {
             app.release();
             self.ending = Some(app.telemetry().now);
@@ -101,7 +96,7 @@ impl Worker {
     }
 
     /// How the gripper is left: as soon as that is sure, or the wait for it is over.
-    fn ended(&self, telemetry: &Telemetry<AXES>) -> Option<Stopped> {
+    fn ended<const X: usize>(&self, telemetry: &Telemetry<X>) -> Option<Stopped> {
         let since = self.ending?;
         let ready = telemetry
             .status
@@ -121,30 +116,33 @@ impl Worker {
             .then_some(Stopped::NotConfirmed)
     }
 
-    fn hand_over(&mut self, app: &mut PcApp) {
+    fn hand_over<R: Gripper<X>, const X: usize>(&mut self, app: &mut PcApp<R, X>) {
         let telemetry = *app.telemetry();
+        let hub = self.hub.clone();
+        let mut said = hub.lock();
         if telemetry.frame_sequence != self.seen.frame
             && let Some(frame) = frame_record(&telemetry)
         {
-            self.send(Record::Frame(Box::new(frame)));
+            self.tell(&mut said, Record::Frame(Box::new(frame)));
         }
         if let Some(sent) = telemetry.sent
             && telemetry.sent_sequence != self.seen.sent
         {
-            self.send(Record::Command(self.command_record(&sent)));
+            self.tell(&mut said, Record::Command(self.command_record(&sent)));
         }
         if let Some(status) = telemetry.status
             && telemetry.status_sequence != self.seen.status
         {
-            self.send(Record::Status(status));
+            self.tell(&mut said, Record::Status(status.into()));
         }
         while let Some(event) = app.next_event() {
-            self.send(Record::Event {
+            let record = Record::Event {
                 at: event.at,
                 sort: sort(&event.kind),
                 text: event.kind.to_string(),
                 kind: event.kind,
-            });
+            };
+            self.tell(&mut said, record);
         }
         // An activation that has ended is over, whatever the gripper does later.
         let ready = telemetry.status.is_some_and(|status| {
@@ -160,31 +158,45 @@ impl Worker {
                 .map(|sent| sent.stamp),
             status: telemetry.status_sequence,
         };
-        *lock(&self.snapshot) = Some(telemetry);
+        let useless = telemetry.frame_sequence > 0 && !telemetry.angles_valid;
+        said.totals = Totals::InProcess(telemetry.counters, self.scheduling);
+        said.say(Snapshot::from(&telemetry), useless);
     }
 
-    fn command_record(&self, sent: &Sent<AXES>) -> Command {
+    fn command_record<const X: usize>(&self, sent: &Sent<X>) -> Command {
         let age = sent.at.checked_duration_since(sent.stamp);
         Command {
             at: sent.at,
-            motion: sent.motion,
+            motion: sent.motion.into(),
             age_us: age.filter(|_| sent.follows).map(|age| age.as_micros()),
             first: sent.follows && self.seen.stamp != Some(sent.stamp),
         }
     }
 
-    fn send(&self, record: Record) {
-        if self.records.try_send(record).is_err() {
-            self.lost.fetch_add(1, Ordering::Relaxed);
+    /// Counts a record, and hands it to who keeps it.
+    fn tell(&self, said: &mut Said, record: Record) {
+        said.numbers.count(&record);
+        if let Record::Event {
+            sort, text, kind, ..
+        } = &record
+        {
+            said.happened(Happened {
+                sort: *sort,
+                text: text.clone(),
+                kind: *kind,
+            });
+        }
+        if let Some(feed) = &self.feed {
+            feed.hand(record);
         }
     }
 }
 
 /// Whether a hold that was decided after the clutch opened (`since`) has left, and a later status repeats its positions. A
 /// command decided before may be a slow opening of the safe action: no hold, though it does not follow the hand either.
-fn hold_confirmed(
-    sent: Option<&Sent<AXES>>,
-    status: Option<&Status<AXES>>,
+fn hold_confirmed<const X: usize>(
+    sent: Option<&Sent<X>>,
+    status: Option<&Status<X>>,
     since: Instant,
 ) -> bool {
     let (Some(sent), Some(status)) = (sent, status) else {
@@ -222,7 +234,7 @@ fn sort(kind: &Kind) -> Sort {
     if fault { Sort::Fault } else { Sort::Note }
 }
 
-fn frame_record(telemetry: &Telemetry<AXES>) -> Option<Frame> {
+fn frame_record<const X: usize>(telemetry: &Telemetry<X>) -> Option<Frame> {
     let frame = telemetry.frame.as_ref()?;
     let imus = frame.samples.map(|sample| {
         let quaternion = sample.orientation.as_ref();
@@ -238,7 +250,7 @@ fn frame_record(telemetry: &Telemetry<AXES>) -> Option<Frame> {
         imus,
         angles: telemetry.angles,
         angles_valid: telemetry.angles_valid,
-        map_output: telemetry.map_output,
+        map_output: telemetry.map_output.map(Into::into),
         following: telemetry.state.is_moving(),
     })
 }
@@ -246,6 +258,7 @@ fn frame_record(telemetry: &Telemetry<AXES>) -> Option<Frame> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::record::AXES;
     use gripper::{Contact, Fault, Motion};
 
     #[test]

@@ -13,7 +13,6 @@ mod show;
 mod table;
 mod task;
 
-use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -50,7 +49,7 @@ pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
     let target = options.verb.target();
     let is_tcp = host::lines::tcp::Address::parse(&target.gripper)?.is_some();
     if is_tcp && target.model != Model::ThreeFinger {
-        return Err(only_three_finger_on_tcp().into());
+        return Err(host::probe::only_three_finger_on_tcp().into());
     }
     let line = Line::open(&target.gripper, target.settings(), interrupt)?;
     let config = target.driver_config(&line);
@@ -62,35 +61,6 @@ pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
             options,
             interrupt,
         ),
-    }
-}
-
-/// What to say to who wants another gripper on the network.
-pub(super) fn only_three_finger_on_tcp() -> Failure {
-    Failure::usage(
-        "only the 3-Finger gripper speaks Modbus TCP",
-        "a serial port, or the 3f model",
-    )
-}
-
-/// Whether a gripper of this model answers at `place`; it is only read.
-///
-/// # Errors
-/// A failure that says why it does not.
-pub(super) fn probe(place: &Path, model: Model, interrupt: &Interrupt) -> Result<()> {
-    let target = &Target::delivered(place, model);
-    let line = Line::open(place, target.settings(), interrupt)?;
-    let config = target.driver_config(&line);
-    let waiter = &Waiter::new(interrupt);
-    match model.two_finger() {
-        None => {
-            let mut driver = ThreeFinger::new(line, config);
-            first_status(waiter, &mut driver, target, config).map(drop)
-        }
-        Some(two) => {
-            let mut driver = TwoFinger::new(line, two, config);
-            first_status(waiter, &mut driver, target, config).map(drop)
-        }
     }
 }
 

@@ -3,14 +3,15 @@
 use std::time::Duration;
 
 use bridge::event::Kind;
+use bridge::protocol::message::{Counters, Sample};
 use gripper::Instant;
 
-use super::replies::Failed;
+use super::axes::Axes;
+use super::obeyed::{MOVED_COUNTS, Obeyed};
+use super::record::{Record, Sort};
+use super::summary::Summary;
 use super::summary::rounded;
-use super::{MOVED_COUNTS, Obeyed, Summary};
-use host::realtime::Scheduling;
-use host::session::record::{AXES, Record, Sort};
-use host::stats::{Percentiles, Rate};
+use crate::stats::{Percentiles, Rate};
 
 /// Counters of a run, in bounded memory.
 #[derive(Debug, Default)]
@@ -36,13 +37,17 @@ pub struct Numbers {
     moving: Duration,
     held: Duration,
     /// Positions when following began.
-    start_positions: Option<[u8; AXES]>,
+    start_positions: Option<Axes<u8>>,
     first_motion: Option<Instant>,
     /// What the gripper was told last, where that followed the hand.
-    told: Option<[u8; AXES]>,
+    told: Option<Axes<u8>>,
     /// Whether it went there.
     pub obeyed: Obeyed,
     last_fault: Option<String>,
+    /// Telemetry samples of a bridge on a chip.
+    samples: Option<u64>,
+    /// Cycles of the gripper in the last second, as a chip counted them.
+    chip_cycles_per_s: Option<f64>,
 }
 
 impl Numbers {
@@ -81,7 +86,7 @@ impl Numbers {
             Record::Status(status) => {
                 self.cycles.add(status.stamp.as_ticks());
                 self.look_for_motion(status.stamp, status.position);
-                self.obeyed.status(status, self.told);
+                self.obeyed.status(status, self.told.as_deref());
             }
             Record::Event {
                 sort, text, kind, ..
@@ -97,6 +102,37 @@ impl Numbers {
         }
     }
 
+    /// Counts in a telemetry sample of a bridge on a chip.
+    pub fn sample(&mut self, sample: &Sample) {
+        let now_us = sample.now_us;
+        let last = self.last_sequence.replace(sample.frame_sequence);
+        let fresh = last.map_or(0, |last| sample.frame_sequence.wrapping_sub(last));
+        for _ in 0..fresh.min(16) {
+            self.frames.add(now_us);
+        }
+        self.samples = Some(self.samples.unwrap_or(0) + 1);
+        self.following = sample.state.is_moving();
+        if !self.following {
+            return;
+        }
+        // What is in an axis' way is not told on this wire.
+        self.obeyed
+            .look(now_us, &sample.command, &sample.position, |_| false);
+        if let Some(us) = sample.latency_us {
+            self.latency.add(us.into());
+        }
+        if let Some(position) = Axes::new(&sample.position) {
+            self.look_for_motion(Instant::from_ticks(now_us), position);
+        }
+    }
+
+    /// A bridge on a chip has counted so much, `grown` of it in the last `time`.
+    pub fn chip(&mut self, counters: &Counters, grown: &Counters, time: Duration) {
+        self.faults = counters.faults.into();
+        let cycles = f64::from(grown.statuses) / time.as_secs_f64().max(1e-3);
+        self.chip_cycles_per_s = Some(cycles);
+    }
+
     /// `time` passed, in which the clutch was closed or not, and the gripper followed or not.
     pub fn pass(&mut self, time: Duration, clutch: bool, moving: bool) {
         match (clutch, moving) {
@@ -107,15 +143,15 @@ impl Numbers {
         }
     }
 
-    fn look_for_motion(&mut self, at: Instant, position: [u8; AXES]) {
+    fn look_for_motion(&mut self, at: Instant, position: Axes<u8>) {
         if !self.following || self.first_motion.is_some() {
             return;
         }
         let start = *self.start_positions.get_or_insert(position);
         let moved = start
             .iter()
-            .zip(position)
-            .any(|(start, now)| start.abs_diff(now) >= MOVED_COUNTS);
+            .zip(&*position)
+            .any(|(start, now)| start.abs_diff(*now) >= MOVED_COUNTS);
         if moved {
             self.first_motion = Some(at);
         }
@@ -126,28 +162,34 @@ impl Numbers {
         self.frames_passed_over + self.sequence_gaps
     }
 
-    /// Faults so far.
-    pub fn faults(&self) -> u64 {
-        self.faults
+    /// How it goes at `now`.
+    pub fn progress(&mut self, now: Instant) -> Progress {
+        Progress {
+            frames_per_s: self.frames.now(now.as_ticks()),
+            cycles_per_s: self
+                .chip_cycles_per_s
+                .unwrap_or_else(|| self.cycles.now(now.as_ticks())),
+            latency_p50: self.latency.at(0.5),
+            latency_p99: self.latency.at(0.99),
+            dropped: self.dropped(),
+            faults: self.faults,
+        }
     }
 
-    /// When the gripper first moved with the hand.
-    pub fn first_motion(&self) -> Option<Instant> {
-        self.first_motion
+    /// Since the run began, at `now`, s.
+    pub fn seconds(&self, now: Instant) -> f64 {
+        now.as_ticks().saturating_sub(self.begun) as f64 / 1e6
     }
 
-    /// The sum of the run.
-    pub fn summary(
-        &self,
-        counters: Option<bridge::telemetry::Counters>,
-        scheduling: Scheduling,
-    ) -> Summary {
+    /// The sum of the run; what only counters tell is left at nothing.
+    pub fn summary(&self, now: Instant) -> Summary {
         Summary {
+            seconds: rounded(self.seconds(now)),
             glove_frames: self.frames.count(),
             glove_frames_per_s: rounded(self.frames.mean()),
             frames_following: self.frames_answered + self.frames_passed_over,
             frames_answered: self.frames_answered,
-            frames_dropped: self.dropped(),
+            frames_dropped: Some(self.dropped()),
             gripper_cycles: self.cycles.count(),
             gripper_cycles_per_s: rounded(self.cycles.mean()),
             commands: self.commands,
@@ -156,31 +198,39 @@ impl Numbers {
             latency_max_us: self.latency.longest(),
             faults: self.faults,
             last_fault: self.last_fault.clone(),
-            gripper_failed: counters.map_or_else(Failed::default, |c| {
-                Failed::between(&gripper::link::Counters::default(), &c.gripper)
-            }),
-            steps: counters.map_or(0, |c| c.steps),
-            late_steps: counters.map_or(0, |c| c.late_steps),
-            worst_late_us: counters.map_or(0, |c| c.worst_late_us),
-            stalls: counters.map_or(0, |c| c.stalls),
-            gripper_errors: counters.map_or(0, |c| c.gripper_errors),
-            holds: counters.map_or(0, |c| c.holds),
             moving_s: rounded(self.moving.as_secs_f64()),
             held_s: rounded(self.held.as_secs_f64()),
-            scheduling,
-            first_motion_s: self.first_motion.map(|at| {
-                let since = at.as_ticks().saturating_sub(self.begun);
-                rounded(since as f64 / 1e6)
-            }),
+            samples: self.samples,
+            first_motion_s: self.first_motion.map(|at| rounded(self.seconds(at))),
+            ..Summary::default()
         }
     }
+}
+
+/// How a run goes.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Progress {
+    /// Frames of the glove in the last second.
+    pub frames_per_s: f64,
+    /// Cycles of the gripper in the last second.
+    pub cycles_per_s: f64,
+    /// From the oldest sample used to the command, µs: half of all commands were faster.
+    pub latency_p50: Option<u64>,
+    /// The same for 99 of 100.
+    pub latency_p99: Option<u64>,
+    /// Frames that no command answered while following, and frames that never arrived.
+    pub dropped: u64,
+    /// Faults so far.
+    pub faults: u64,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::realtime::Scheduling;
+    use crate::session::record::{AXES, Command, Frame, Imu};
+    use bridge::telemetry::Counters;
     use gripper::{Activation, Contact, Fault, Motion, Status};
-    use host::session::record::{Command, Frame, Imu};
 
     fn at(us: u64) -> Instant {
         Instant::from_ticks(us)
@@ -203,21 +253,26 @@ mod tests {
         }))
     }
 
+    fn motion() -> crate::session::snapshot::Motion {
+        Motion {
+            position: [0; AXES],
+            speed: [0; AXES],
+            force: [0; AXES],
+        }
+        .into()
+    }
+
     fn command(first: bool) -> Record {
         Record::Command(Command {
             at: at(0),
-            motion: Motion {
-                position: [0; AXES],
-                speed: [0; AXES],
-                force: [0; AXES],
-            },
+            motion: motion(),
             age_us: Some(40_000),
             first,
         })
     }
 
     fn status(us: u64, position: u8) -> Record {
-        Record::Status(Status {
+        let status = Status {
             stamp: at(us),
             activation: Activation::Ready,
             going_to: true,
@@ -226,7 +281,8 @@ mod tests {
             position: [position; AXES],
             current: [0; AXES],
             fault: Fault::None,
-        })
+        };
+        Record::Status(status.into())
     }
 
     #[test]
@@ -241,7 +297,7 @@ mod tests {
         numbers.count(&frame(160_000, 3, true));
         numbers.count(&command(true));
         assert_eq!(numbers.dropped(), 2);
-        let summary = numbers.summary(None, Scheduling::Shared);
+        let summary = numbers.summary(at(0));
         assert_eq!((summary.frames_following, summary.frames_answered), (3, 2));
     }
 
@@ -250,13 +306,13 @@ mod tests {
         let mut numbers = Numbers::default();
         numbers.count(&status(1, 6));
         numbers.count(&status(2, 100));
-        assert_eq!(numbers.first_motion(), None);
+        assert_eq!(numbers.first_motion, None);
         numbers.count(&frame(3, 0, true));
         numbers.count(&status(4, 100));
         numbers.count(&status(5, 103));
-        assert_eq!(numbers.first_motion(), None);
+        assert_eq!(numbers.first_motion, None);
         numbers.count(&status(6, 104));
-        assert_eq!(numbers.first_motion(), Some(at(6)));
+        assert_eq!(numbers.first_motion, Some(at(6)));
     }
 
     #[test]
@@ -272,14 +328,14 @@ mod tests {
         ] {
             numbers.pass(second, clutch, moving);
         }
-        let summary = numbers.summary(None, Scheduling::Shared);
+        let summary = numbers.summary(at(0));
         assert_eq!((summary.moving_s, summary.held_s), (2.0, 1.0));
     }
 
     #[test]
     fn late_steps_blame_the_computer() {
         let blamed = |late_steps, worst_late_us| {
-            let counters = bridge::telemetry::Counters {
+            let counters = Counters {
                 late_steps,
                 worst_late_us,
                 stalls: u32::from(worst_late_us > 100_000),
@@ -287,7 +343,9 @@ mod tests {
                 holds: 1,
                 ..Default::default()
             };
-            let summary = Numbers::default().summary(Some(counters), Scheduling::Shared);
+            let summary = Numbers::default()
+                .summary(at(0))
+                .with(&counters, Scheduling::Shared);
             summary.lines().iter().any(|line| line.contains("too busy"))
         };
         assert!(!blamed(20, 3_000));
@@ -297,21 +355,23 @@ mod tests {
 
     #[test]
     fn a_stop_of_two_seconds_is_told_as_one() {
-        let counters = bridge::telemetry::Counters {
+        let counters = Counters {
             late_steps: 1,
             worst_late_us: 2_013_000,
             stalls: 1,
             steps: 1000,
             ..Default::default()
         };
-        let summary = Numbers::default().summary(Some(counters), Scheduling::Shared);
+        let summary = Numbers::default()
+            .summary(at(0))
+            .with(&counters, Scheduling::Shared);
         let said = summary.lines().join("\n");
         assert!(said.contains("stood still 1 times, up to 2.0 s"), "{said}");
     }
 
     #[test]
     fn a_run_in_which_nothing_came_has_numbers_and_no_nan_in_json() {
-        let summary = Numbers::default().summary(None, Scheduling::Shared);
+        let summary = Numbers::default().summary(at(0));
         let json = serde_json::to_value(&summary).unwrap();
         for name in [
             "glove_frames_per_s",
@@ -326,15 +386,10 @@ mod tests {
     #[test]
     fn only_the_first_command_on_a_frame_is_its_latency() {
         let mut numbers = Numbers::default();
-        let motion = Motion {
-            position: [0; AXES],
-            speed: [0; AXES],
-            force: [0; AXES],
-        };
         for (age_us, first) in [(None, false), (Some(31_000), true), (Some(39_000), false)] {
             numbers.count(&Record::Command(Command {
                 at: at(0),
-                motion,
+                motion: motion(),
                 age_us,
                 first,
             }));

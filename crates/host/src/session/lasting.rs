@@ -1,9 +1,9 @@
 //! What has lasted until now. A run is judged by how it ended, and one bad frame just then is no end.
 
-use std::time::{Duration, Instant};
+use gripper::{Duration, Instant};
 
 /// So long something must have been so to count.
-const LASTS: Duration = Duration::from_millis(500);
+const LASTS: Duration = Duration::from_ticks(500_000);
 
 /// Something that may be so, and since when.
 #[derive(Debug, Clone)]
@@ -27,7 +27,8 @@ impl<T: Copy> Lasting<T> {
     /// What it is, where it has lasted.
     pub fn lasted(&self, now: Instant) -> Option<T> {
         let (what, since) = self.newest?;
-        (now.saturating_duration_since(since) >= LASTS).then_some(what)
+        let lasted = now.checked_duration_since(since)?;
+        (lasted >= LASTS).then_some(what)
     }
 }
 
@@ -37,8 +38,7 @@ mod tests {
 
     #[test]
     fn what_is_over_for_a_moment_begins_anew() {
-        let start = Instant::now();
-        let at = |ms| start + Duration::from_millis(ms);
+        let at = |ms: u64| Instant::from_ticks(1_000 * ms);
         let mut held = Lasting::default();
         held.look(Some(1), at(0));
         held.look(Some(2), at(400));

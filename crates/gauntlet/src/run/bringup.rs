@@ -1,14 +1,15 @@
-//! Calibrating on the flat hand at the beginning of a run.
+//! What comes before the clutch may close: the calibration on the flat hand, the gripper's activation.
 
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::calibration::{Refusal, Try};
+use bridge::calibration::Try;
 
 use super::Run;
 use crate::tell::Tell;
+use gripper::Activation;
 use host::failure::Failure;
-use host::session::Order;
+use host::session::{Order, Snapshot, refused};
 
 /// For a person to lay the hand flat and hold it still.
 pub const WAIT: Duration = Duration::from_secs(30);
@@ -20,6 +21,9 @@ pub const DONE: &str = "calibrate  done: the hand as it lies is all joints at ze
 /// For the bridge to say how it ended.
 const ANSWER_WAIT: Duration = Duration::from_secs(2);
 
+/// An activation takes a few seconds; a gripper that needs longer has a fault.
+const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
+
 impl Run {
     /// Takes the hand as flat once it has been still for a second, within [`WAIT`]. Returns whether to go on: not when
     /// somebody asked for the end.
@@ -28,7 +32,7 @@ impl Run {
     /// What ended the bridge, or why the hand was not taken.
     pub fn calibrate(&mut self, tell: &Tell) -> Result<bool> {
         let ended = |run: &Self| {
-            let seen = run.session.snapshot();
+            let seen = run.snapshot();
             seen.map_or(0, |seen| seen.calibration.ended)
         };
         let before = ended(self);
@@ -60,21 +64,38 @@ impl Run {
             .into()),
         }
     }
-}
 
-/// Why the hand was not taken, and what helps.
-pub fn refused(why: Refusal) -> Failure {
-    let next = match why {
-        Refusal::NoFrames => {
-            "the glove's cable and power; `gauntlet doctor` says which layer fails"
+    /// Activates the gripper where it is not, and waits until it is ready. Returns whether to go on: not when somebody asked
+    /// for the end.
+    ///
+    /// # Errors
+    /// What ended the bridge, or that the gripper is not ready.
+    pub fn activate(&mut self, tell: &Tell) -> Result<bool> {
+        let ready = |seen: &Snapshot| {
+            let status = seen.status;
+            status.is_some_and(|status| status.activation == Activation::Ready)
+        };
+        if self.snapshot().as_ref().is_some_and(ready) {
+            return Ok(true);
         }
-        Refusal::Missing(_) => "the cables of these sensors, and their power",
-        Refusal::Moving { .. } | Refusal::TooShort { .. } => {
-            "the same again, the hand resting on a table until it says done"
+        tell.say(format_args!("activating the gripper: its fingers move"));
+        self.order(Order::Activate);
+        let ready = self.wait(ACTIVATION_WAIT, ready)?;
+        if ready || self.asked() {
+            return Ok(ready);
         }
-        Refusal::Bent { .. } => "the same again, the palm on a table and the fingers stretched",
-        Refusal::Engaged => "opening the clutch first",
-        Refusal::NothingBefore => "calibrating on a flat hand",
-    };
-    Failure::new(format!("the glove was not calibrated: {why}"), next)
+        let status = self.snapshot().and_then(|seen| seen.status);
+        let fault = status.map_or_else(String::new, |status| {
+            let fault = status.fault;
+            format!(" (fault {:02X}: {})", fault.code(), fault.sentence())
+        });
+        Err(Failure::new(
+            format!(
+                "the gripper was not ready {} s after its activation was asked for{fault}",
+                ACTIVATION_WAIT.as_secs()
+            ),
+            "take what blocks its fingers away, switch its 24 V supply off and on, and start again",
+        )
+        .into())
+    }
 }

@@ -28,7 +28,7 @@ pub struct Failed {
 
 impl Failed {
     /// Between two looks at the line's counters.
-    pub(super) fn between(before: &Counters, after: &Counters) -> Self {
+    pub fn between(before: &Counters, after: &Counters) -> Self {
         let late = after.stale.wrapping_sub(before.stale);
         Self {
             // A late reply was missed first.
@@ -70,13 +70,13 @@ impl Failed {
 
 /// The last seconds of a line.
 #[derive(Debug, Default)]
-pub(super) struct Replies {
+pub struct Replies {
     looks: VecDeque<(Instant, Counters)>,
 }
 
 impl Replies {
     /// Looks at the counters now. Returns what is to be told of the last two seconds.
-    pub(super) fn look(&mut self, now: Instant, counters: &Counters) -> Option<String> {
+    pub fn look(&mut self, now: Instant, counters: &Counters) -> Option<String> {
         let due = |(at, _): &(Instant, Counters)| now.duration_since(*at) >= LOOK_EVERY;
         if self.looks.back().is_none_or(due) {
             self.looks.push_back((now, *counters));

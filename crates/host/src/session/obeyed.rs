@@ -1,10 +1,11 @@
 //! Whether the gripper went where it was told, over a whole run: one that takes every command, says that all is well and
 //! stands (its motors off, its fingers jammed) is no gripper that works.
 
-use gripper::{Contact, Status};
+use gripper::Contact;
 
-use host::session::record::AXES;
-use host::words::AXIS_WORDS;
+use super::axes::MOST as AXES;
+use super::snapshot::Status;
+use crate::words::axis_words;
 
 /// Counts of position that are a motion: more than noise of the measured position.
 pub const MOVED_COUNTS: u8 = 4;
@@ -59,14 +60,14 @@ impl Obeyed {
     }
 
     /// The same with a whole status.
-    pub fn status(&mut self, status: &Status<AXES>, told: Option<[u8; AXES]>) {
+    pub fn status(&mut self, status: &Status, told: Option<&[u8]>) {
         match told {
             Some(told) => {
                 let at = status.stamp.as_ticks();
-                self.look(at, &told, &status.position, |axis| {
+                self.look(at, told, &status.position, |axis| {
                     matches!(
-                        status.contact[axis],
-                        Contact::ContactOpening | Contact::ContactClosing
+                        status.contact(axis),
+                        Some(Contact::ContactOpening | Contact::ContactClosing)
                     )
                 });
             }
@@ -100,7 +101,8 @@ impl Obeyed {
         if !self.moved && (told || self.stood.is_some()) {
             return Some("the gripper was told to move and never moved".to_owned());
         }
-        let name = AXIS_WORDS.get(self.stood?.0).unwrap_or(&"an axis");
+        let axes = self.start.iter().flatten().count();
+        let name = axis_words(axes).get(self.stood?.0).unwrap_or(&"an axis");
         Some(format!(
             "the gripper's {name} stood although it was told to move, and has not moved since"
         ))

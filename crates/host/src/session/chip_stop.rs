@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use bridge::State;
 use gripper::Activation;
 
-use host::chip::link::{Error, HostLink};
-use host::session::stopped::{HOLD_WAIT, Stopped};
+use super::stopped::{HOLD_WAIT, Stopped};
+use crate::chip::link::{Error, HostLink};
 
 /// Between two looks.
 const PAUSE: Duration = Duration::from_millis(30);
@@ -28,7 +28,11 @@ fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
     let released_us = link.release()?.now_us;
     let at_release = link.counters()?;
     if at_release.commands == 0 {
-        return Ok(Stopped::Untouched);
+        let gripper = link.status()?.gripper;
+        return Ok(match gripper.map(|gripper| gripper.activation) {
+            Some(Activation::Activating) => Stopped::Activating,
+            _ => Stopped::Untouched,
+        });
     }
     let end = Instant::now() + Duration::from_micros(HOLD_WAIT.as_micros());
     let mut command = None;

@@ -1,0 +1,93 @@
+//! A recording of a hand from a bridge on a chip: its telemetry samples as rows of a poses file.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+
+use anyhow::Result;
+use bridge::protocol::message::Sample;
+
+use host::failure::OrFail;
+use host::interrupt::Interrupt;
+
+/// Samples that may wait for the disk: 50 s.
+const QUEUE: usize = 1024;
+
+/// A poses file being written, by a thread of its own.
+#[derive(Debug)]
+pub(super) struct Poses {
+    path: PathBuf,
+    writer: JoinHandle<(u64, std::io::Result<()>)>,
+}
+
+impl Poses {
+    /// Creates the file, never over one that is there; and where the samples go. A disk that takes no more asks for the end.
+    ///
+    /// # Errors
+    /// A failure that names the file.
+    pub(super) fn create(path: &Path, interrupt: &Interrupt) -> Result<(Self, SyncSender<Sample>)> {
+        let name = || format!("the log {}", path.display());
+        let file = File::create_new(path)
+            .or_fail(name, "a new file's name, in a folder that you may write to")?;
+        let (sender, samples) = sync_channel(QUEUE);
+        let interrupt = interrupt.clone();
+        let writer = std::thread::Builder::new()
+            .spawn(move || {
+                let mut rows = 0;
+                let written = write(file, &samples, &mut rows);
+                if written.is_err() {
+                    interrupt.ask();
+                }
+                (rows, written)
+            })
+            .or_fail(name, "ending other programs")?;
+        let poses = Self {
+            path: path.to_owned(),
+            writer,
+        };
+        Ok((poses, sender))
+    }
+
+    /// Waits for the last row; the session has ended. Returns how many there are. A file without one is taken away: it would
+    /// stand in the way of the same command again.
+    ///
+    /// # Errors
+    /// A failure that names the file.
+    pub(super) fn finish(self) -> Result<u64> {
+        let stopped = || (0, Err(std::io::Error::other("its writer stopped")));
+        let (rows, written) = self.writer.join().unwrap_or_else(|_| stopped());
+        if rows == 0 {
+            let _ = std::fs::remove_file(&self.path);
+        }
+        let name = || format!("the log {}", self.path.display());
+        written.or_fail(name, "room on the disk")?;
+        Ok(rows)
+    }
+}
+
+fn write(file: File, samples: &Receiver<Sample>, rows: &mut u64) -> std::io::Result<()> {
+    let mut file = BufWriter::new(file);
+    write!(file, "time_s")?;
+    for name in glove::hand::JOINT_NAMES {
+        write!(file, ",{name}")?;
+    }
+    writeln!(file)?;
+    let mut last_frame = 0;
+    for sample in samples {
+        // The same frame twice is no new pose; before the first frame there is none.
+        if std::mem::replace(&mut last_frame, sample.frame_sequence) == sample.frame_sequence {
+            continue;
+        }
+        write!(file, "{:.6}", sample.now_us as f64 / 1e6)?;
+        for angle in sample.angles {
+            write!(file, ",{angle}")?;
+        }
+        writeln!(file)?;
+        *rows += 1;
+    }
+    file.into_inner()
+        .map_err(std::io::IntoInnerError::into_error)?
+        .sync_all()
+}

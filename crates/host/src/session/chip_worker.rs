@@ -1,0 +1,320 @@
+//! The thread's side of a session on a chip: orders become requests, answers and samples become what is said at the hub.
+
+use std::sync::mpsc::SyncSender;
+use std::time::{Duration, Instant};
+
+use bridge::Epoch;
+use bridge::HoldReason;
+use bridge::calibration::{CalibrationState, Refusal, Try};
+use bridge::clutch::{HeartbeatRefusal, Position};
+use bridge::event::Kind;
+use bridge::protocol::message::{Counters, Sample, Status};
+
+use super::axes::Axes;
+use super::chip_stop::stop;
+use super::hub::{Happened, Hub, Totals};
+use super::on_chip::Left;
+use super::orders::{Order, Queue};
+use super::record::Sort;
+use super::snapshot::{self, Snapshot};
+use super::stopped::Stopped;
+use crate::chip::link::{Error, Heartbeat, HostLink};
+
+/// Pause between two looks at the orders, spent listening.
+const LISTEN: Duration = Duration::from_millis(20);
+/// Pause between two heartbeats: what else is asked is answered in it or not at all.
+const HEARTBEAT: Duration = Duration::from_millis(100);
+/// Pause between two questions for the status without heartbeats; a session ends after 2 s.
+const STATUS_EVERY: Duration = Duration::from_millis(500);
+/// The same while a calibration is tried.
+const TRY_EVERY: Duration = Duration::from_millis(100);
+/// Pause between two looks at the counters.
+const COUNT_EVERY: Duration = Duration::from_secs(1);
+/// Heartbeats without an answer, in a row, after which nobody is there: 2 s.
+const MISSED_BEATS: u32 = 20;
+/// Frames between two looks at the counters that say something of the glove.
+const LEAST_FRAMES: u32 = 5;
+
+/// A calibration that is tried as often as it takes.
+#[derive(Debug, Clone, Copy)]
+struct Trying {
+    until: Instant,
+    /// Tries that had ended when the newest began.
+    ended: u16,
+}
+
+/// The thread.
+#[derive(Debug)]
+pub(super) struct Worker {
+    link: HostLink,
+    orders: Queue,
+    hub: Hub,
+    samples: Option<SyncSender<Sample>>,
+    /// Of the closing that is kept.
+    epoch: Option<Epoch>,
+    /// The clutch was closed, or the gripper told to activate, by this session.
+    touched: bool,
+    clutch: Position,
+    missed: u32,
+    status: Status,
+    asked_status: Instant,
+    sample: Option<Sample>,
+    calibration: CalibrationState,
+    trying: Option<Trying>,
+    counted: (Instant, Counters),
+    useless: bool,
+}
+
+impl Worker {
+    pub fn new(
+        link: HostLink,
+        orders: Queue,
+        hub: Hub,
+        samples: Option<SyncSender<Sample>>,
+        status: Status,
+        counters: Counters,
+    ) -> Self {
+        let now = Instant::now();
+        hub.lock().totals = Totals::on_chip(&counters, now);
+        let worker = Self {
+            link,
+            orders,
+            hub,
+            samples,
+            epoch: None,
+            touched: false,
+            clutch: Position::Open,
+            missed: 0,
+            status,
+            asked_status: now,
+            sample: None,
+            calibration: CalibrationState::default(),
+            trying: None,
+            counted: (now, counters),
+            useless: false,
+        };
+        worker.say();
+        worker
+    }
+
+    pub fn run(mut self) -> Left {
+        let fault = loop {
+            match self.round() {
+                Ok(true) => {}
+                Ok(false) => break None,
+                Err(error) => break Some(error),
+            }
+        };
+        let stopped = match self.touched {
+            true => stop(&mut self.link),
+            // Somebody else may drive it.
+            false => Stopped::Untouched,
+        };
+        if let Ok(counters) = self.link.counters() {
+            self.take_counters(counters);
+        }
+        // Nobody listens any more, whether the bridge hears it or not.
+        let _ = self.link.telemetry(0);
+        Left { stopped, fault }
+    }
+
+    /// Returns whether to go on.
+    fn round(&mut self) -> Result<bool, Error> {
+        let mut quiet = self.epoch.is_none();
+        while let Some(order) = self.orders.next() {
+            if order == Order::Stop {
+                return Ok(false);
+            }
+            self.obey(order)?;
+            quiet |= order == Order::Heartbeat;
+        }
+        let every = self.trying.map_or(STATUS_EVERY, |_| TRY_EVERY);
+        if self.epoch.is_none() && self.asked_status.elapsed() >= every {
+            self.asked_status = Instant::now();
+            self.status = self.link.status()?;
+            self.look_at_calibration()?;
+        }
+        if quiet {
+            self.count()?;
+        }
+        for sample in self.link.listen(LISTEN)? {
+            self.hub.lock().numbers.sample(&sample);
+            if let Some(samples) = &self.samples {
+                // Who keeps them and is slow, or gone, says so.
+                let _ = samples.try_send(sample.clone());
+            }
+            self.sample = Some(sample);
+        }
+        self.say();
+        Ok(true)
+    }
+
+    fn obey(&mut self, order: Order) -> Result<(), Error> {
+        match order {
+            Order::Engage => {
+                // Also where the answer is lost: the bridge may have closed it.
+                (self.touched, self.epoch) = (true, None);
+                let (epoch, status) = self.link.engage()?;
+                (self.epoch, self.status) = (Some(epoch), status);
+                (self.clutch, self.missed) = (Position::Closed, 0);
+            }
+            Order::Heartbeat => {
+                if let Some(epoch) = self.epoch {
+                    self.heartbeat(epoch)?;
+                }
+            }
+            Order::Release => {
+                (self.epoch, self.clutch) = (None, Position::Open);
+                self.status = self.link.release()?;
+            }
+            Order::Activate => {
+                self.touched = true;
+                self.link.activate()?;
+            }
+            Order::Calibrate(_) if self.epoch.is_some() => {
+                self.calibrated(Try::Refused(Refusal::Engaged));
+            }
+            Order::Calibrate(wait) => {
+                let ended = self.link.health()?.calibration.ended;
+                self.link.calibrate_flat_hand()?;
+                let until = Instant::now() + Duration::from_micros(wait.as_micros());
+                self.trying = Some(Trying { until, ended });
+                self.calibration.newest = Try::Waiting;
+            }
+            Order::UndoCalibration => self.link.undo_calibration()?,
+            Order::Stop => {}
+        }
+        Ok(())
+    }
+
+    fn heartbeat(&mut self, epoch: Epoch) -> Result<(), Error> {
+        match self.link.heartbeat(epoch)? {
+            Heartbeat::Kept(status) => {
+                self.missed = 0;
+                self.status = status;
+            }
+            // Somebody else's release, or their closing, is an act: nothing went wrong.
+            Heartbeat::Refused(why) => {
+                self.epoch = None;
+                self.clutch = match why {
+                    HeartbeatRefusal::Expired => Position::Expired,
+                    _ => Position::Open,
+                };
+            }
+            Heartbeat::Unanswered => self.missed += 1,
+        }
+        if self.missed >= MISSED_BEATS {
+            return Err(Error::Silent {
+                address: self.link.address().clone(),
+                attempts: self.missed,
+                heard: self.link.heard(),
+            });
+        }
+        Ok(())
+    }
+
+    fn look_at_calibration(&mut self) -> Result<(), Error> {
+        let now = match self.link.health() {
+            // That of an older bridge, which only watches and is flashed, is not known.
+            Err(Error::Older { .. }) => return Ok(()),
+            health => health?.calibration,
+        };
+        let Some(trying) = &mut self.trying else {
+            self.calibration.is_calibrated = now.is_calibrated;
+            return Ok(());
+        };
+        match now.newest {
+            _ if now.ended == trying.ended => {}
+            Try::Refused(why) if Instant::now() < trying.until && why != Refusal::Engaged => {
+                trying.ended = now.ended;
+                self.link.calibrate_flat_hand()?;
+            }
+            newest => {
+                self.trying = None;
+                self.calibration.is_calibrated = now.is_calibrated;
+                self.calibrated(newest);
+            }
+        }
+        Ok(())
+    }
+
+    /// A try ended, for this session's watchers.
+    fn calibrated(&mut self, newest: Try) {
+        self.calibration.newest = newest;
+        self.calibration.ended = self.calibration.ended.wrapping_add(1);
+        let kind = Kind::Calibration(newest);
+        let refused = matches!(newest, Try::Refused(_));
+        self.hub.lock().happened(Happened {
+            sort: if refused { Sort::Fault } else { Sort::Note },
+            text: kind.to_string(),
+            kind,
+        });
+    }
+
+    /// Once a second, where the answer comes before the next heartbeat.
+    fn count(&mut self) -> Result<(), Error> {
+        if self.counted.0.elapsed() < COUNT_EVERY {
+            return Ok(());
+        }
+        if let Some(counters) = self.link.counters_by(Instant::now() + HEARTBEAT)? {
+            self.take_counters(counters);
+        }
+        Ok(())
+    }
+
+    fn take_counters(&mut self, counters: Counters) {
+        let now = Instant::now();
+        let (at, before) = std::mem::replace(&mut self.counted, (now, counters));
+        let grown = counters.since(&before);
+        let all = grown.frames >= LEAST_FRAMES && grown.unusable_frames >= grown.frames;
+        // What else makes frames useless is told as what it is.
+        let told = match self.status.state.hold_reason() {
+            Some(HoldReason::NotCalibrated | HoldReason::NoWeights) => true,
+            _ => self.epoch.is_none() && !self.calibration.is_calibrated,
+        };
+        self.useless = all && !told && self.status.active_slot.is_some();
+        let mut said = self.hub.lock();
+        said.numbers.chip(&counters, &grown, now.duration_since(at));
+        said.totals.count(&counters, now);
+    }
+
+    fn say(&self) {
+        let status = &self.status;
+        let sample = self.sample.as_ref();
+        let sample = sample.filter(|sample| sample.now_us >= status.now_us);
+        let newest = self.sample.as_ref();
+        let now_us = newest.map_or(status.now_us, |sample| sample.now_us.max(status.now_us));
+        let now = gripper::Instant::from_ticks(now_us);
+        let gripper = status.gripper.as_ref().and_then(|gripper| {
+            let position = sample.map_or(&gripper.position, |sample| &sample.position);
+            Some(snapshot::Status {
+                stamp: now,
+                activation: gripper.activation,
+                fault: gripper.fault,
+                echo: Axes::new(&gripper.echo)?,
+                position: Axes::new(position).or(Axes::new(&gripper.position))?,
+                more: None,
+            })
+        });
+        let seen = Snapshot {
+            now,
+            state: sample.map_or(status.state, |sample| sample.state),
+            clutch: self.clutch,
+            calibration: self.calibration,
+            frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
+            frame: None,
+            angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),
+            angles_valid: status.glove_answers && !self.useless,
+            distrusted: 0,
+            command: newest.and_then(|sample| Axes::new(&sample.command)),
+            sent: None,
+            gripper_answers: gripper.is_some(),
+            status: gripper,
+            stands: None,
+            glove_answers: status.glove_answers,
+            line: None,
+            late_steps: self.counted.1.late_steps,
+        };
+        self.hub.lock().say(seen, self.useless);
+    }
+}

@@ -1,0 +1,233 @@
+//! Where a session says what is so: many watch, and the newest wins.
+//!
+//! The bridge's thread writes, whoever likes reads, and nobody waits for anybody but for the moment of a copy. Of the
+//! state only the newest is kept, of what happened the newest [`EVENTS`]; counting is done where things happen, so that no
+//! watcher can miss a number.
+
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use bridge::clutch::Position;
+use bridge::event::Kind;
+use bridge::protocol::message;
+use bridge::telemetry::Counters;
+use bridge::{HoldReason, State};
+
+use super::ending::Ending;
+use super::lasting::Lasting;
+use super::numbers::{Numbers, Progress};
+use super::record::Sort;
+use super::snapshot::Snapshot;
+use super::summary::Summary;
+use crate::realtime::Scheduling;
+
+/// Events kept for watchers.
+pub const EVENTS: usize = 32;
+
+/// Something that happened.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Happened {
+    /// Which sort of thing.
+    pub sort: Sort,
+    /// What, in words.
+    pub text: String,
+    /// The same for the program.
+    pub kind: Kind,
+}
+
+/// What a session says. Clones watch the same one.
+#[derive(Debug, Clone, Default)]
+pub struct Hub(Arc<Mutex<Said>>);
+
+/// What only a home's own counters tell.
+#[derive(Debug, Default)]
+pub(super) enum Totals {
+    /// Nothing yet.
+    #[default]
+    None,
+    /// Of a bridge in this process.
+    InProcess(Counters, Scheduling),
+    /// Of a bridge on a chip: what it had counted when the run began, and now; and when it said so.
+    OnChip {
+        before: (message::Counters, Instant),
+        newest: (message::Counters, Instant),
+    },
+}
+
+impl Totals {
+    /// Of a bridge on a chip, from here on.
+    pub fn on_chip(counters: &message::Counters, at: Instant) -> Self {
+        let before = (*counters, at);
+        Self::OnChip {
+            before,
+            newest: before,
+        }
+    }
+
+    /// A bridge on a chip said what it has counted.
+    pub fn count(&mut self, counters: &message::Counters, at: Instant) {
+        if let Self::OnChip { newest, .. } = self {
+            *newest = (*counters, at);
+        }
+    }
+
+    fn begin(&mut self) {
+        if let Self::OnChip { before, newest } = self {
+            *before = *newest;
+        }
+    }
+}
+
+/// What was said so far.
+#[derive(Debug, Default)]
+pub(super) struct Said {
+    newest: Option<Snapshot>,
+    pub numbers: Numbers,
+    pub totals: Totals,
+    events: VecDeque<Happened>,
+    /// Events so far.
+    happened: u64,
+    held: Lasting<HoldReason>,
+    useless: Lasting<()>,
+}
+
+impl Said {
+    /// The newest state. `useless`: no frame of the glove can be used.
+    pub fn say(&mut self, now: Snapshot, useless: bool) {
+        if let Some(before) = &self.newest {
+            let passed = now.now.checked_duration_since(before.now);
+            let us = passed.map_or(0, |passed| passed.as_micros());
+            let closed = matches!(now.clutch, Position::Closed | Position::Lost);
+            let (time, moving) = (Duration::from_micros(us), now.state.is_moving());
+            self.numbers.pass(time, closed, moving);
+        }
+        self.held.look(now.state.hold_reason(), now.now);
+        self.useless.look(useless.then_some(()), now.now);
+        self.newest = Some(now);
+    }
+
+    /// Something happened.
+    pub fn happened(&mut self, event: Happened) {
+        if self.events.len() == EVENTS {
+            self.events.pop_front();
+        }
+        self.events.push_back(event);
+        self.happened += 1;
+    }
+}
+
+impl Hub {
+    pub(super) fn lock(&self) -> MutexGuard<'_, Said> {
+        // Nothing panics while holding it; a poisoned lock still holds a valid value.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The state now; `None` before the bridge first told it.
+    pub fn snapshot(&self) -> Option<Snapshot> {
+        self.lock().newest
+    }
+
+    /// How the run goes.
+    pub fn progress(&self) -> Progress {
+        let mut said = self.lock();
+        let now = said.newest.map(|newest| newest.now);
+        now.map_or_else(Progress::default, |now| said.numbers.progress(now))
+    }
+
+    /// What happened since `seen` events had; `seen` is how many have now. What is older than the newest [`EVENTS`] is gone.
+    pub fn happened(&self, seen: &mut u64) -> Vec<Happened> {
+        let said = self.lock();
+        let fresh = said.happened.saturating_sub(*seen);
+        *seen = said.happened;
+        let old = said
+            .events
+            .len()
+            .saturating_sub(usize::try_from(fresh).unwrap_or(EVENTS));
+        said.events.iter().skip(old).cloned().collect()
+    }
+
+    /// How everything is, to judge a run by that ends now: before its clutch is opened. `attended`: somebody can press keys;
+    /// `expired`: the clutch opened by itself, and nobody closed it again.
+    pub fn ending(&self, attended: bool, expired: bool) -> Option<Ending> {
+        let said = self.lock();
+        let seen = said.newest.as_ref()?;
+        Some(Ending {
+            state: seen.state,
+            attended,
+            expired,
+            held: said.held.lasted(seen.now),
+            glove_answers: seen.glove_answers,
+            useless: said.useless.lasted(seen.now).map(|()| seen.why_useless()),
+            gripper_answers: seen.gripper_answers,
+            disobeyed: said.numbers.obeyed.fault(),
+        })
+    }
+
+    /// The sum of the run.
+    pub fn summary(&self) -> Summary {
+        let said = self.lock();
+        let Some(newest) = &said.newest else {
+            return Summary::default();
+        };
+        let summary = said.numbers.summary(newest.now);
+        match &said.totals {
+            Totals::None => summary,
+            Totals::InProcess(counters, scheduling) => summary.with(counters, *scheduling),
+            Totals::OnChip { before, newest } => {
+                let time = newest.1.saturating_duration_since(before.1);
+                summary.on_chip(&newest.0.since(&before.0), time)
+            }
+        }
+    }
+
+    /// Forgets what was counted while things were brought up: the run begins now.
+    pub fn begin(&self) {
+        let mut said = self.lock();
+        if let Some(now) = said.newest.map(|newest| newest.now) {
+            said.numbers.begin(now);
+            said.totals.begin();
+        }
+    }
+
+    /// Whether the gripper follows the hand.
+    pub fn is_moving(&self) -> bool {
+        self.snapshot().is_some_and(|seen| seen.state.is_moving())
+    }
+
+    /// Whether nothing is wanted of the gripper and the newest command that left holds it, decided after `since`.
+    pub fn is_idle_since(&self, since: gripper::Instant) -> bool {
+        self.snapshot().is_some_and(|seen| {
+            let holds = |sent: super::snapshot::Sent| !sent.follows && sent.decided > since;
+            seen.state == State::Idle && seen.sent.is_none_or(holds)
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bridge::calibration::Try;
+
+    #[test]
+    fn each_watcher_hears_every_event_once_and_of_a_flood_the_newest() {
+        let hub = Hub::default();
+        let say = |count: usize| {
+            for number in 0..count {
+                hub.lock().happened(Happened {
+                    sort: Sort::Note,
+                    text: number.to_string(),
+                    kind: Kind::Calibration(Try::Taken),
+                });
+            }
+        };
+        let (mut first, mut second) = (0, 0);
+        say(3);
+        assert_eq!(hub.happened(&mut first).len(), 3);
+        assert_eq!(hub.happened(&mut first).len(), 0);
+        say(EVENTS + 5);
+        let heard = hub.happened(&mut first);
+        assert_eq!((heard.len(), heard[0].text.as_str()), (EVENTS, "5"));
+        assert_eq!(hub.clone().happened(&mut second), heard);
+    }
+}

@@ -1,0 +1,259 @@
+//! The bridge in this process: [`bridge::App`] on a thread of its own, over the glove's and the gripper's port.
+//!
+//! The thread ends in an orderly way: the clutch is opened, the bridge sends the hold, and only then is the gripper's port
+//! closed.
+
+use std::marker::PhantomData;
+use std::thread::JoinHandle;
+
+use anyhow::Result;
+use bridge::{App, WeightsStore};
+use glove::hand::Side;
+use glove::scan::{self, Scanner};
+use gripper::driver::{ThreeFinger, TwoFinger};
+use gripper::{Gripper, Instant};
+
+use super::Session;
+use super::hub::Hub;
+use super::orders::{Order, Orders};
+use super::record::Feed;
+use super::slots::MemorySlot;
+use super::stopped::Stopped;
+use super::worker::Worker;
+use crate::clock::Clock;
+use crate::failure::{Failure, OrFail, told};
+use crate::interrupt::Interrupt;
+use crate::lines::port::{BAUD, Port, Watch};
+use crate::lines::{Line, Model, Pc, Settings};
+use crate::realtime::{self, Scheduling};
+
+/// The bridge as a PC runs it, for a gripper of `X` axes.
+pub(super) type PcApp<R, const X: usize> = App<PcBoard<R>, X>;
+
+/// A PC with a gripper of this kind.
+#[derive(Debug)]
+pub(super) struct PcBoard<R>(Pc, PhantomData<fn() -> R>);
+
+impl<R> bridge::Platform for PcBoard<R> {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        self.0.wait_until(due);
+    }
+}
+
+impl<R: Gripper<X>, const X: usize> bridge::Board<X> for PcBoard<R> {
+    type Glove = Port;
+    type Gripper = R;
+    type Flash = MemorySlot;
+}
+
+/// What a session is made of.
+#[derive(Debug)]
+pub struct Parts {
+    /// The glove's port.
+    pub glove: Port,
+    /// The gripper's line.
+    pub gripper: Line,
+    /// Which gripper it is.
+    pub model: Model,
+    /// Unit, speed and patience of that line.
+    pub line: Settings,
+    /// The weights image.
+    pub image: Vec<u8>,
+    /// Which hand wears the glove.
+    pub side: Side,
+    /// Whom every frame, command, status and event is handed to.
+    pub feed: Option<Feed>,
+}
+
+/// A bridge in this process.
+#[derive(Debug)]
+pub struct InProcess {
+    thread: Option<JoinHandle<Stopped>>,
+    orders: Orders,
+    hub: Hub,
+    ports: [(&'static str, Watch); 2],
+    scheduling: Scheduling,
+}
+
+impl InProcess {
+    /// Starts the bridge. Nothing moves: the clutch is open, and the gripper is only read.
+    ///
+    /// # Errors
+    /// A failure where the image is not one for this gripper, or the system gives no thread.
+    pub fn start(parts: Parts, clock: Clock, interrupt: &Interrupt) -> Result<Self> {
+        match parts.model.two_finger() {
+            None => Self::with(parts, clock, interrupt, ThreeFinger::new),
+            Some(model) => {
+                let driver = move |line, config| TwoFinger::new(line, model, config);
+                Self::with(parts, clock, interrupt, driver)
+            }
+        }
+    }
+
+    fn with<R: Gripper<X> + 'static, const X: usize>(
+        parts: Parts,
+        clock: Clock,
+        interrupt: &Interrupt,
+        driver: impl FnOnce(Line, gripper::driver::Config) -> R + Send + 'static,
+    ) -> Result<Self> {
+        let store = stored(&parts.image, parts.model)?;
+        let settings = bridge::Settings::<X> {
+            side: parts.side,
+            ..bridge::Settings::default()
+        };
+        let config = bridge::Config::new(settings).map_err(told)?;
+        let (orders, queue) = Orders::queue(clock);
+        let hub = Hub::default();
+        let ports = [
+            ("glove", parts.glove.watch()),
+            ("gripper", parts.gripper.watch()),
+        ];
+        let watches = ports.clone().map(|(_, watch)| watch);
+        let platform = Pc::new(clock, watches, interrupt.clone());
+        let mut worker = Worker::new(queue, hub.clone(), parts.feed);
+        let line = parts.gripper.driver_config(parts.line);
+        let (glove, gripper) = (parts.glove, parts.gripper);
+        let bridge = std::thread::Builder::new().name("bridge".to_owned());
+        let (tell_scheduling, scheduling) = std::sync::mpsc::sync_channel(1);
+        let start = move || {
+            bridge.spawn(move || {
+                let scan = scan::Config {
+                    baud: BAUD,
+                    ..scan::Config::default()
+                };
+                let scanner = Scanner::new(glove, scan).with_set_baud(Port::set_baud);
+                let gripper = driver(gripper, line);
+                let mut app: PcApp<R, X> = App::new(
+                    PcBoard(platform, PhantomData),
+                    scanner,
+                    gripper,
+                    store,
+                    config,
+                );
+                worker.scheduling = scheduling.recv().unwrap_or(Scheduling::Shared);
+                worker.run(&mut app)
+            })
+        };
+        let refused = || "the bridge cannot start".to_owned();
+        let next = "ending other programs";
+        let (thread, scheduling) = realtime::starting(start).or_fail(refused, next)?;
+        let thread = thread.or_fail(refused, next)?;
+        // Its place is free.
+        let _ = tell_scheduling.send(scheduling);
+        Ok(Self {
+            thread: Some(thread),
+            orders,
+            hub,
+            ports,
+            scheduling,
+        })
+    }
+}
+
+impl Session for InProcess {
+    fn orders(&self) -> &Orders {
+        &self.orders
+    }
+
+    fn hub(&self) -> &Hub {
+        &self.hub
+    }
+
+    fn ports(&self) -> &[(&'static str, Watch)] {
+        &self.ports
+    }
+
+    fn running(&self) -> bool {
+        let thread = self.thread.as_ref();
+        thread.is_some_and(|thread| !thread.is_finished())
+    }
+
+    fn scheduling(&self) -> Option<Scheduling> {
+        Some(self.scheduling)
+    }
+
+    fn ended(&mut self) -> anyhow::Error {
+        match self.stop() {
+            Ok(_) => anyhow::anyhow!("the bridge ended"),
+            Err(error) => error,
+        }
+    }
+
+    fn stop(&mut self) -> Result<Stopped> {
+        self.orders.give(Order::Stop);
+        match self.thread.take().map(JoinHandle::join) {
+            Some(Ok(stopped)) => Ok(stopped),
+            Some(Err(_)) | None => Err(Failure::new(
+                "the bridge stopped on a fault of its own: the gripper was not held",
+                "look at the gripper; then the same again with --log, and report what it says",
+            )
+            .into()),
+        }
+    }
+}
+
+impl Drop for InProcess {
+    fn drop(&mut self) {
+        if self.thread.is_some() {
+            let _ = self.stop();
+        }
+    }
+}
+
+/// Whether a weights image gives as many positions as the gripper has axes.
+///
+/// # Errors
+/// A failure that says how many it gives, and what to do.
+pub fn check_image(image: &[u8], model: Model) -> Result<()> {
+    // The header's number of outputs (docs/weights-image.md); whatever else is wrong with it, the store says.
+    let outputs = image.get(32..36).and_then(|bytes| bytes.try_into().ok());
+    match outputs.map(|bytes| u32::from_le_bytes(bytes) as usize) {
+        Some(outputs) if image.starts_with(&hae::image::MAGIC) && outputs != model.axes() => {
+            Err(other_shape(outputs, model).into())
+        }
+        _ => Ok(()),
+    }
+}
+
+fn other_shape(outputs: usize, model: Model) -> Failure {
+    let next = match outputs {
+        1 => {
+            "the same with --gripper-model 2f85, 2f140 or hande, if it is one of these; else a map for it: `gauntlet train --help`"
+        }
+        4 => {
+            "the same with --gripper-model 3f, if it is the 3-Finger; else a map for it: `gauntlet train --help`"
+        }
+        _ => "a map for this gripper: `gauntlet train --help`",
+    };
+    Failure::new(
+        format!(
+            "the map gives {outputs} position{}, and the {} has {} ax{}s",
+            if outputs == 1 { "" } else { "s" },
+            model.name(),
+            model.axes(),
+            if model.axes() == 1 { "i" } else { "e" },
+        ),
+        next,
+    )
+}
+
+/// A store that holds the image, put there the way it comes over a line: begun, in chunks, committed last.
+fn stored(image: &[u8], model: Model) -> Result<WeightsStore<MemorySlot>> {
+    check_image(image, model)?;
+    let expected = bridge::app::expected(model.axes());
+    let mut store = WeightsStore::new([MemorySlot::new(), MemorySlot::new()], expected);
+    let refused = || "the weights image was refused".to_owned();
+    let next = "training the model again";
+    store.begin(image.len()).or_fail(refused, next)?;
+    for (index, chunk) in image.chunks(bridge::store::PAGE).enumerate() {
+        store
+            .chunk(index * bridge::store::PAGE, chunk)
+            .or_fail(refused, next)?;
+    }
+    store.commit().or_fail(refused, next)?;
+    Ok(store)
+}

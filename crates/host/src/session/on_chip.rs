@@ -1,0 +1,133 @@
+//! The bridge on a chip: a conversation over the host protocol on a thread of its own.
+//!
+//! A heartbeat is asked once and nothing else is waited for between two of them; what the chip counts is asked for in the
+//! pause behind one. What it does not tell (its sensors one by one, its events) is absent from what is said at the hub.
+
+use std::sync::mpsc::SyncSender;
+use std::thread::JoinHandle;
+
+use anyhow::Result;
+use bridge::protocol::message::Sample;
+
+use super::Session;
+use super::chip_worker::Worker;
+use super::hub::Hub;
+use super::orders::{Order, Orders};
+use super::stopped::Stopped;
+use crate::chip::link::{Error, HostLink};
+use crate::clock::Clock;
+use crate::failure::{Failure, OrFail};
+use crate::lines::port::Watch;
+use crate::realtime::Scheduling;
+
+/// Pause between two telemetry samples, ms.
+pub const SAMPLE_MS: u16 = 50;
+
+/// What a conversation leaves.
+#[derive(Debug)]
+pub(super) struct Left {
+    /// How the gripper was left; untouched where this session never closed the clutch.
+    pub stopped: Stopped,
+    /// What ended it.
+    pub fault: Option<Error>,
+}
+
+/// A bridge on a chip.
+#[derive(Debug)]
+pub struct OnChip {
+    thread: Option<JoinHandle<Left>>,
+    left: Option<Stopped>,
+    orders: Orders,
+    hub: Hub,
+}
+
+impl OnChip {
+    /// Begins to watch the bridge behind `link`. Nothing moves, and who else drives it is not disturbed. `samples`: who is
+    /// handed every telemetry sample.
+    ///
+    /// # Errors
+    /// The line's fault, or the system gives no thread.
+    pub fn start(
+        mut link: HostLink,
+        clock: Clock,
+        samples: Option<SyncSender<Sample>>,
+    ) -> Result<Self> {
+        let counters = link.counters().map_err(Failure::from)?;
+        let status = link.status().map_err(Failure::from)?;
+        link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
+        let (orders, queue) = Orders::queue(clock);
+        let hub = Hub::default();
+        let worker = Worker::new(link, queue, hub.clone(), samples, status, counters);
+        let thread = std::thread::Builder::new()
+            .name("bridge on a chip".to_owned())
+            .spawn(move || worker.run())
+            .or_fail(
+                || "the bridge cannot be watched".to_owned(),
+                "ending other programs",
+            )?;
+        Ok(Self {
+            thread: Some(thread),
+            left: None,
+            orders,
+            hub,
+        })
+    }
+
+    /// Waits for the thread's end, which is near: every request of its has a deadline.
+    fn join(&mut self) -> Option<Error> {
+        let thread = self.thread.take()?;
+        let left = thread.join().unwrap_or(Left {
+            stopped: Stopped::Unheard,
+            fault: None,
+        });
+        self.left = Some(left.stopped);
+        left.fault
+    }
+}
+
+impl Session for OnChip {
+    fn orders(&self) -> &Orders {
+        &self.orders
+    }
+
+    fn hub(&self) -> &Hub {
+        &self.hub
+    }
+
+    fn ports(&self) -> &[(&'static str, Watch)] {
+        &[]
+    }
+
+    fn running(&self) -> bool {
+        let thread = self.thread.as_ref();
+        thread.is_some_and(|thread| !thread.is_finished())
+    }
+
+    fn scheduling(&self) -> Option<Scheduling> {
+        None
+    }
+
+    fn ended(&mut self) -> anyhow::Error {
+        match self.join() {
+            Some(fault) => Failure::from(fault).into(),
+            None => anyhow::anyhow!("the bridge ended"),
+        }
+    }
+
+    fn stop(&mut self) -> Result<Stopped> {
+        self.orders.give(Order::Stop);
+        let fault = self.join();
+        match (self.left, fault) {
+            (Some(Stopped::Untouched) | None, Some(fault)) => Err(Failure::from(fault).into()),
+            (left, _) => Ok(left.unwrap_or(Stopped::Unheard)),
+        }
+    }
+}
+
+impl Drop for OnChip {
+    fn drop(&mut self) {
+        if self.thread.is_some() {
+            let _ = self.stop();
+        }
+    }
+}

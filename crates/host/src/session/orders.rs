@@ -1,0 +1,132 @@
+//! What a bridge can be told, by as many as like to: one bounded queue, in which orders meet.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+
+use bridge::timing::{HEARTBEAT_TIMEOUT, is_within};
+use gripper::{Duration, Instant};
+
+use crate::clock::Clock;
+
+/// Orders that may wait; a bridge in this process takes them every 10 ms.
+const ORDERS: usize = 64;
+
+/// What the bridge can be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Order {
+    /// Close the clutch: an act of a person.
+    Engage,
+    /// Keep the clutch closed that was closed last: send one every 100 ms. It closes nothing.
+    Heartbeat,
+    /// Open the clutch: hold.
+    Release,
+    /// Activate the gripper: the fingers move.
+    Activate,
+    /// Take the hand as flat, once it has been still for a second; within so long.
+    Calibrate(Duration),
+    /// Take the newest calibration back.
+    UndoCalibration,
+    /// Hold, and end.
+    Stop,
+}
+
+impl Order {
+    /// Whether it makes motion possible: then it counts only while it is young.
+    fn moves(self) -> bool {
+        matches!(self, Self::Engage | Self::Heartbeat | Self::Activate)
+    }
+}
+
+/// An order, and when it was given. Between that and its being read a process can stand still.
+#[derive(Debug, Clone, Copy)]
+struct Given {
+    order: Order,
+    at: Instant,
+}
+
+/// A giver's end. Clones give into the same queue.
+#[derive(Debug, Clone)]
+pub struct Orders {
+    queue: SyncSender<Given>,
+    stop: Arc<AtomicBool>,
+    clock: Clock,
+}
+
+impl Orders {
+    /// Both ends of an empty queue.
+    pub fn queue(clock: Clock) -> (Self, Queue) {
+        let (queue, given) = sync_channel(ORDERS);
+        let stop = Arc::new(AtomicBool::new(false));
+        let taken = Queue {
+            given,
+            stop: Arc::clone(&stop),
+            clock,
+        };
+        (Self { queue, stop, clock }, taken)
+    }
+
+    /// Tells the bridge something; never waits. Returns whether it was taken: not when the queue is full or the bridge has
+    /// ended. [`Order::Stop`] has a place of its own and is always taken.
+    pub fn give(&self, order: Order) -> bool {
+        if order == Order::Stop {
+            self.stop.store(true, Ordering::Relaxed);
+            return true;
+        }
+        let at = self.clock.now();
+        self.queue.try_send(Given { order, at }).is_ok()
+    }
+}
+
+/// The bridge's end.
+#[derive(Debug)]
+pub struct Queue {
+    given: Receiver<Given>,
+    stop: Arc<AtomicBool>,
+    clock: Clock,
+}
+
+impl Queue {
+    /// The next order; never waits. What makes motion possible and is older than a heartbeat lasts is passed over, and all of
+    /// it once the end was ordered.
+    pub fn next(&self) -> Option<Order> {
+        let ends = self.stop.load(Ordering::Relaxed);
+        while let Ok(Given { order, at }) = self.given.try_recv() {
+            let old = !is_within(self.clock.now(), at, HEARTBEAT_TIMEOUT);
+            if !(order.moves() && (old || ends)) {
+                return Some(order);
+            }
+        }
+        ends.then_some(Order::Stop)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_moves_is_passed_over_once_it_is_old_or_the_end_was_ordered() {
+        let (orders, queue) = Orders::queue(Clock::start());
+        assert!(orders.give(Order::Engage));
+        std::thread::sleep(std::time::Duration::from_micros(
+            HEARTBEAT_TIMEOUT.as_micros() + 1_000,
+        ));
+        assert!(orders.give(Order::Release));
+        assert_eq!(queue.next(), Some(Order::Release), "the engagement is old");
+        assert_eq!(queue.next(), None);
+        orders.give(Order::Activate);
+        orders.clone().give(Order::Stop);
+        assert_eq!(queue.next(), Some(Order::Stop));
+    }
+
+    #[test]
+    fn a_full_queue_refuses_and_still_takes_the_end() {
+        let (orders, queue) = Orders::queue(Clock::start());
+        assert!((0..ORDERS).all(|_| orders.give(Order::Release)));
+        assert!(!orders.give(Order::Heartbeat));
+        assert!(orders.give(Order::Stop));
+        assert!((0..ORDERS).all(|_| queue.next() == Some(Order::Release)));
+        assert_eq!(queue.next(), Some(Order::Stop));
+    }
+}

@@ -1,0 +1,187 @@
+//! The state of everything at one moment, whatever the gripper's number of axes and wherever the bridge runs.
+
+use bridge::calibration::CalibrationState;
+use bridge::clutch::Position;
+use bridge::{State, Telemetry};
+use glove::hand::JOINT_COUNT;
+use glove::scan;
+use gripper::{Activation, Contact, Fault, Instant};
+
+use super::axes::Axes;
+use crate::words;
+
+/// What the gripper is asked to do.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Motion {
+    /// Counts, 0 open to 255 closed.
+    pub position: Axes<u8>,
+    /// 0 slowest to 255 fastest.
+    pub speed: Axes<u8>,
+    /// 0 least to 255 most.
+    pub force: Axes<u8>,
+}
+
+impl<const X: usize> From<gripper::Motion<X>> for Motion {
+    fn from(motion: gripper::Motion<X>) -> Self {
+        Self {
+            position: motion.position.into(),
+            speed: motion.speed.into(),
+            force: motion.force.into(),
+        }
+    }
+}
+
+/// What the gripper said about itself in one reply.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Status {
+    /// When it was asked for, or, of a bridge on a chip, when that told it.
+    pub stamp: Instant,
+    /// Whether it can move.
+    pub activation: Activation,
+    /// What is wrong, if anything.
+    pub fault: Fault,
+    /// The position each axis was last asked for, counts.
+    pub echo: Axes<u8>,
+    /// Where each axis is, counts.
+    pub position: Axes<u8>,
+    /// What a bridge in this process knows besides.
+    pub more: Option<More>,
+}
+
+/// What the host protocol does not carry of a status.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct More {
+    /// Whether it follows the positions asked for (gGTO).
+    pub going_to: bool,
+    /// What stops each axis.
+    pub contact: Axes<Contact>,
+    /// Motor current of each axis, 10 mA a count.
+    pub current: Axes<u8>,
+}
+
+impl Status {
+    /// What stops an axis, where that is known.
+    pub fn contact(&self, axis: usize) -> Option<Contact> {
+        self.more.as_ref()?.contact.get(axis).copied()
+    }
+}
+
+impl<const X: usize> From<gripper::Status<X>> for Status {
+    fn from(status: gripper::Status<X>) -> Self {
+        Self {
+            stamp: status.stamp,
+            activation: status.activation,
+            fault: status.fault,
+            echo: status.echo.into(),
+            position: status.position.into(),
+            more: Some(More {
+                going_to: status.going_to,
+                contact: status.contact.into(),
+                current: status.current.into(),
+            }),
+        }
+    }
+}
+
+/// The state of everything at one moment. What a bridge on a chip does not tell is `None`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Snapshot {
+    /// The bridge's time.
+    pub now: Instant,
+    /// State of the supervisor.
+    pub state: State,
+    /// Where the clutch is.
+    pub clutch: Position,
+    /// Whether the glove is calibrated, and how the newest try ended.
+    pub calibration: CalibrationState,
+    /// Counts frames taken; 0: none yet.
+    pub frame_sequence: u32,
+    /// The newest frame's sensors.
+    pub frame: Option<scan::Frame>,
+    /// Joint angles, radians.
+    pub angles: [f32; JOINT_COUNT],
+    /// Whether the newest frame gave angles.
+    pub angles_valid: bool,
+    /// Segments that are not used until the next calibration (bit k: segment k).
+    pub distrusted: u16,
+    /// What the gripper is told now, counts; `None`: it is only read.
+    pub command: Option<Axes<u8>>,
+    /// Whether the newest command that left follows the hand, and when it was decided; `None` before the first.
+    pub sent: Option<Sent>,
+    /// The gripper's newest status.
+    pub status: Option<Status>,
+    /// This axis stands although it is told to move.
+    pub stands: Option<u8>,
+    /// Whether frames come from the glove.
+    pub glove_answers: bool,
+    /// Whether the gripper answers.
+    pub gripper_answers: bool,
+    /// What came on the gripper's line.
+    pub line: Option<gripper::link::Counters>,
+    /// Steps of the supervisor that came late.
+    pub late_steps: u32,
+}
+
+/// The newest command that left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sent {
+    /// Whether it follows the hand.
+    pub follows: bool,
+    /// When it was decided.
+    pub decided: Instant,
+}
+
+impl<const X: usize> From<&Telemetry<X>> for Snapshot {
+    fn from(now: &Telemetry<X>) -> Self {
+        Self {
+            now: now.now,
+            state: now.state,
+            clutch: now.clutch,
+            calibration: now.calibration,
+            frame_sequence: now.frame_sequence,
+            frame: now.frame,
+            angles: now.angles,
+            angles_valid: now.angles_valid,
+            distrusted: now.distrusted,
+            command: now.command.map(|motion| motion.position.into()),
+            sent: now.sent.map(|sent| Sent {
+                follows: sent.follows,
+                decided: sent.decided,
+            }),
+            status: now.status.map(Status::from),
+            stands: now.stands,
+            glove_answers: now.glove_answers,
+            gripper_answers: now.gripper_answers,
+            line: Some(now.counters.gripper),
+            late_steps: now.counters.late_steps,
+        }
+    }
+}
+
+impl Snapshot {
+    /// The sensors that are not used, by name, with what is wrong with them.
+    pub fn unused_sensors(&self) -> Vec<String> {
+        let mut unused = Vec::new();
+        if let Some(frame) = &self.frame {
+            let health = frame.samples.map(|sample| sample.health);
+            unused.extend(words::lost_sensors(&health));
+        }
+        unused.extend(words::distrusted_sensors(self.distrusted));
+        unused
+    }
+
+    /// Why the newest frames could not be used.
+    pub fn why_useless(&self) -> String {
+        if self.frame.is_none() {
+            let told = self.state.hold_reason().map(|reason| reason.to_string());
+            return told.unwrap_or_else(|| {
+                "sensors are lost, frozen or give what is no orientation".to_owned()
+            });
+        }
+        let unused = self.unused_sensors();
+        if unused.is_empty() {
+            return "their joint angles are no numbers".to_owned();
+        }
+        unused.join("; ")
+    }
+}
