@@ -150,7 +150,7 @@ fn open_and_fist(model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]
     store.begin(image.len()).expect("room");
     store.chunk(0, &image).expect("bytes");
     store.commit().expect("an image of one output");
-    let mut app: App<Machine, 1> = App::new(
+    let mut app: App<_, 1> = App::new(
         Machine(clock.clone()),
         Scanner::new(glove_wire, glove::scan::Config::default()),
         TwoFinger::new(gripper_wire, model, gripper::driver::Config::default()),

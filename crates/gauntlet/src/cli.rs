@@ -7,6 +7,7 @@ use clap::{Args, Parser, Subcommand, ValueEnum};
 
 use host::chip::link::Address;
 use host::failure::Failure;
+use host::lines::Model;
 use host::lines::Settings;
 
 /// Operate a Robotiq 3-Finger gripper with a glove of 16 orientation sensors, or try it all without hardware.
@@ -73,6 +74,7 @@ Examples:
   gauntlet demo
   gauntlet demo --poses my_hand.csv --log session.mcap
   gauntlet demo --seconds 60 --json > result.json
+  gauntlet demo --gripper-model 2f85
   gauntlet demo --on-chip
 
 The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians \
@@ -94,6 +96,9 @@ pub struct Demo {
     /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
     #[arg(long)]
     pub no_start_pairs: bool,
+    /// Which gripper follows the hand.
+    #[arg(long, value_name = "MODEL", value_parser = crate::commands::gripper::model_parser(), default_value = "3f")]
+    pub gripper_model: Model,
     /// Run the bridge's ARM firmware in QEMU instead of on this processor.
     #[arg(long, conflicts_with = "log")]
     pub on_chip: bool,
@@ -114,6 +119,7 @@ impl Default for Demo {
             seconds: Duration::from_secs(20),
             seed: 1,
             no_start_pairs: false,
+            gripper_model: Model::ThreeFinger,
             on_chip: false,
             firmware: None,
             json: false,
@@ -145,7 +151,7 @@ pub struct Simulate {
     pub gripper: Option<PathBuf>,
     /// Which gripper it is; the 3-Finger if not said.
     #[arg(long, value_name = "MODEL", value_parser = crate::commands::gripper::model_parser())]
-    pub gripper_model: Option<host::lines::Model>,
+    pub gripper_model: Option<Model>,
     /// The glove plays this recording of a hand instead of generated motion.
     #[arg(long, value_name = "FILE.csv")]
     pub poses: Option<PathBuf>,
@@ -231,9 +237,9 @@ pub struct Teleop {
     /// How the gripper's line differs from that of a gripper as delivered.
     #[command(flatten)]
     pub line: LineOptions,
-    /// Which gripper it is: only the 3-Finger follows a glove for now.
+    /// Which gripper it is; the map gives as many positions as it has axes.
     #[arg(long, value_name = "MODEL", value_parser = crate::commands::gripper::model_parser(), default_value = "3f")]
-    pub gripper_model: host::lines::Model,
+    pub gripper_model: Model,
     /// Write every frame, command and status into this session log.
     #[arg(long, value_name = "FILE.mcap")]
     pub log: Option<PathBuf>,

@@ -30,7 +30,7 @@ fn main() -> anyhow::Result<()> {
     };
     let mut session = InProcess::start(parts, clock, &interrupt)?;
     // The hand lies flat, fingers together, until it has been still for a second.
-    session.order(Order::Calibrate(bridge::Duration::from_secs(30)));
+    session.order(Order::Calibrate(bridge::Duration::from_millis(30_000)));
     let flat = |seen: host::session::Snapshot| seen.calibration.is_calibrated;
     while !session.snapshot().is_some_and(flat) && session.running() && !interrupt.sleep(BEAT) {}
     session.order(Order::Engage);

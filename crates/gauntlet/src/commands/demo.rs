@@ -62,7 +62,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let outcome = trained(options, &motion, &tell, interrupt)?;
     let image = model::image(&outcome.model)?;
     let length = image.len();
-    let model = Model::ThreeFinger;
+    let model = options.gripper_model;
     let log = options.log.clone();
     let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
     let (devices, parts) = devices(&motion, model, image, feed, &tell, interrupt)?;
@@ -94,7 +94,7 @@ pub(super) fn trained(
 ) -> Result<Outcome> {
     let request = Request {
         motion,
-        space: Space::ThreeFinger,
+        space: Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
         schedule: Schedule::Fast,
         epochs: None,
         pairs: PAIRS,

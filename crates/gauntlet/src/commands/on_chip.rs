@@ -29,6 +29,17 @@ const FRAME_WAIT: Duration = Duration::from_secs(20);
 /// A failure that says which of its steps did not succeed.
 pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
+    let gripper_model = options.gripper_model;
+    if gripper_model != Model::ThreeFinger {
+        return Err(Failure::usage(
+            format!(
+                "--on-chip: the firmware is built for the 3-Finger gripper, not for the {}",
+                gripper_model.name()
+            ),
+            format!("`gauntlet demo --gripper-model {}`", gripper_model.option()),
+        )
+        .into());
+    }
     let motion = reading::ended_by(interrupt, "the recording", || {
         Motion::open_for_training(options.poses.as_deref(), options.seed, &Person)
     })?;
@@ -38,7 +49,7 @@ pub(super) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         "gauntlet demo: glove and gripper are virtual, the bridge is its ARM firmware in QEMU"
     ));
     tell.say(format_args!("motion     {}", motion.describe()));
-    let devices = demo::virtual_devices(&motion, Model::ThreeFinger)?;
+    let devices = demo::virtual_devices(&motion, gripper_model)?;
     let mut emulator = Emulator::new(Setup {
         firmware,
         glove: Some(devices[0].path().to_owned()),

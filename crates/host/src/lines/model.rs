@@ -24,14 +24,6 @@ impl Model {
         Self::HandE,
     ];
 
-    /// Its axes: 4, or 1.
-    pub fn axes(self) -> usize {
-        match self {
-            Self::ThreeFinger => gripper::space::AXES,
-            Self::TwoFinger85 | Self::TwoFinger140 | Self::HandE => 1,
-        }
-    }
-
     /// The maker's name for it.
     pub fn name(self) -> &'static str {
         match self.two_finger() {

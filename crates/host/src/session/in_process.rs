@@ -3,15 +3,13 @@
 //! The thread ends in an orderly way: the clutch is opened, the bridge sends the hold, and only then is the gripper's port
 //! closed.
 
-use std::marker::PhantomData;
 use std::thread::JoinHandle;
 
 use anyhow::Result;
-use bridge::{App, WeightsStore};
+use bridge::{App, Board, WeightsStore};
 use glove::hand::Side;
 use glove::scan::{self, Scanner};
 use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::{Gripper, Instant};
 
 use super::Session;
 use super::hub::Hub;
@@ -27,28 +25,20 @@ use crate::lines::port::{BAUD, Port, Watch};
 use crate::lines::{Line, Model, Pc, Settings};
 use crate::realtime::{self, Scheduling};
 
-/// The bridge as a PC runs it, for a gripper of `X` axes.
-pub(super) type PcApp<R, const X: usize> = App<PcBoard<R>, X>;
-
-/// A PC with a gripper of this kind.
-#[derive(Debug)]
-pub(super) struct PcBoard<R>(Pc, PhantomData<fn() -> R>);
-
-impl<R> bridge::Platform for PcBoard<R> {
-    fn now(&mut self) -> Instant {
-        self.0.now()
-    }
-
-    fn wait_until(&mut self, due: Instant) {
-        self.0.wait_until(due);
-    }
-}
-
-impl<R: Gripper<X>, const X: usize> bridge::Board<X> for PcBoard<R> {
+impl Board<4> for Pc {
     type Glove = Port;
-    type Gripper = R;
+    type Gripper = ThreeFinger<Line>;
     type Flash = MemorySlot;
 }
+
+impl Board<1> for Pc {
+    type Glove = Port;
+    type Gripper = TwoFinger<Line>;
+    type Flash = MemorySlot;
+}
+
+/// The bridge as a PC runs it, for a gripper of `X` axes.
+pub(super) type PcApp<const X: usize> = App<Pc, X>;
 
 /// What a session is made of.
 #[derive(Debug)]
@@ -86,20 +76,23 @@ impl InProcess {
     /// A failure where the image is not one for this gripper, or the system gives no thread.
     pub fn start(parts: Parts, clock: Clock, interrupt: &Interrupt) -> Result<Self> {
         match parts.model.two_finger() {
-            None => Self::with(parts, clock, interrupt, ThreeFinger::new),
+            None => Self::with::<4>(parts, clock, interrupt, ThreeFinger::new),
             Some(model) => {
                 let driver = move |line, config| TwoFinger::new(line, model, config);
-                Self::with(parts, clock, interrupt, driver)
+                Self::with::<1>(parts, clock, interrupt, driver)
             }
         }
     }
 
-    fn with<R: Gripper<X> + 'static, const X: usize>(
+    fn with<const X: usize>(
         parts: Parts,
         clock: Clock,
         interrupt: &Interrupt,
-        driver: impl FnOnce(Line, gripper::driver::Config) -> R + Send + 'static,
-    ) -> Result<Self> {
+        driver: impl FnOnce(Line, gripper::driver::Config) -> <Pc as Board<X>>::Gripper + Send + 'static,
+    ) -> Result<Self>
+    where
+        Pc: Board<X, Glove = Port, Flash = MemorySlot>,
+    {
         let store = stored(&parts.image, parts.model)?;
         let settings = bridge::Settings::<X> {
             side: parts.side,
@@ -127,13 +120,7 @@ impl InProcess {
                 };
                 let scanner = Scanner::new(glove, scan).with_set_baud(Port::set_baud);
                 let gripper = driver(gripper, line);
-                let mut app: PcApp<R, X> = App::new(
-                    PcBoard(platform, PhantomData),
-                    scanner,
-                    gripper,
-                    store,
-                    config,
-                );
+                let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);
                 worker.scheduling = scheduling.recv().unwrap_or(Scheduling::Shared);
                 worker.run(&mut app)
             })

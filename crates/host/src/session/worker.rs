@@ -3,8 +3,8 @@
 use bridge::calibration::Try;
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
-use bridge::{Epoch, HoldReason, State, Telemetry};
-use gripper::{Activation, Gripper, Instant, Status};
+use bridge::{Board, Epoch, HoldReason, State, Telemetry};
+use gripper::{Activation, Instant, Status};
 
 use super::hub::{Happened, Hub, Said, Totals};
 use super::in_process::PcApp;
@@ -12,6 +12,7 @@ use super::orders::{Order, Queue};
 use super::record::{Command, Feed, Frame, Imu, Record, Sort};
 use super::snapshot::Snapshot;
 use super::stopped::{HOLD_WAIT, Stopped};
+use crate::lines::Pc;
 use crate::realtime::Scheduling;
 
 /// The thread's side of a session in this process.
@@ -52,7 +53,10 @@ impl Worker {
         }
     }
 
-    pub fn run<R: Gripper<X>, const X: usize>(mut self, app: &mut PcApp<R, X>) -> Stopped {
+    pub fn run<const X: usize>(mut self, app: &mut PcApp<X>) -> Stopped
+    where
+        Pc: Board<X>,
+    {
         let mut stopped = Stopped::NotConfirmed;
         app.run(|app| {
             self.obey(app);
@@ -66,7 +70,10 @@ impl Worker {
         stopped
     }
 
-    fn obey<R: Gripper<X>, const X: usize>(&mut self, app: &mut PcApp<R, X>) {
+    fn obey<const X: usize>(&mut self, app: &mut PcApp<X>)
+    where
+        Pc: Board<X>,
+    {
         while let Some(order) = self.orders.next() {
             match order {
                 Order::Engage => self.epoch = Some(app.engage()),
@@ -88,7 +95,10 @@ impl Worker {
         }
     }
 
-    fn end<R: Gripper<X>, const X: usize>(&mut self, app: &mut PcApp<R, X>) {
+    fn end<const X: usize>(&mut self, app: &mut PcApp<X>)
+    where
+        Pc: Board<X>,
+    {
         if self.ending.is_none() {
             app.release();
             self.ending = Some(app.telemetry().now);
@@ -116,7 +126,10 @@ impl Worker {
             .then_some(Stopped::NotConfirmed)
     }
 
-    fn hand_over<R: Gripper<X>, const X: usize>(&mut self, app: &mut PcApp<R, X>) {
+    fn hand_over<const X: usize>(&mut self, app: &mut PcApp<X>)
+    where
+        Pc: Board<X>,
+    {
         let telemetry = *app.telemetry();
         let hub = self.hub.clone();
         let mut said = hub.lock();
