@@ -42,6 +42,14 @@ impl Model {
         }
     }
 
+    /// Axes that are told where to go.
+    pub fn axes(self) -> usize {
+        match self.two_finger() {
+            None => gripper::space::AXES,
+            Some(_) => 1,
+        }
+    }
+
     /// The 2-Finger or Hand-E model it is, if it is one.
     pub fn two_finger(self) -> Option<two_finger::Model> {
         match self {
