@@ -69,6 +69,14 @@ pub struct App<B: Board<X>, const X: usize> {
     events: heapless::Deque<Event, { event::CAPACITY }>,
 }
 
+/// A board, and the devices that an [`App`] owned.
+pub type Parts<B, const X: usize> = (
+    B,
+    Scanner<<B as Board<X>>::Glove>,
+    <B as Board<X>>::Gripper,
+    WeightsStore<<B as Board<X>>::Flash>,
+);
+
 impl<B: Board<X>, const X: usize> core::fmt::Debug for App<B, X> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("App")
@@ -281,7 +289,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     }
 
     /// Gives everything back.
-    pub fn into_parts(self) -> (B, Scanner<B::Glove>, B::Gripper, WeightsStore<B::Flash>) {
+    pub fn into_parts(self) -> Parts<B, X> {
         (self.board, self.scanner, self.gripper, self.store)
     }
 }
