@@ -219,7 +219,8 @@ fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
         return Ok(());
     }
     if at.json {
-        return out::json(&link.health().map_err(Failure::from)?.calibration);
+        let health = serde_json::to_value(link.health().map_err(Failure::from)?)?;
+        return out::json(&health["calibration"]);
     }
     Ok(())
 }
