@@ -4,7 +4,7 @@ use crate::Duration;
 use glove::hand::flat;
 
 /// Whether the glove is calibrated, and how the newest try ended.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CalibrationState {
     /// The calibration in use is worth something: one was taken, and neither the `hand` sensor nor two others have restarted
     /// since. Without it nothing moves.
@@ -16,7 +16,7 @@ pub struct CalibrationState {
 }
 
 /// A try to calibrate on the flat hand.
-#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Try {
     /// There was none.
     #[default]
@@ -32,7 +32,7 @@ pub enum Try {
 }
 
 /// Why a flat hand was not taken.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
     /// The clutch is closed: calibrating comes before engaging.
     Engaged,

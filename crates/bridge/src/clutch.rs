@@ -27,7 +27,7 @@ pub enum Clutch {
 }
 
 /// The clutch at one moment.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Position {
     /// Opened by a person, or never closed.
     Open,
@@ -40,7 +40,7 @@ pub enum Position {
 }
 
 /// Why a heartbeat was not taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HeartbeatRefusal {
     /// The clutch is open: somebody opened it, or it was never closed.
     Open,

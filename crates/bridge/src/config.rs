@@ -7,7 +7,7 @@ use crate::filter;
 use glove::hand::Side;
 
 /// What happens when motion has been held for 500 ms because data or heartbeat did not come back.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SafeAction {
     /// Stay where the hold put it: what is grasped stays grasped.
     #[default]

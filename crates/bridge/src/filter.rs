@@ -23,7 +23,7 @@ use crate::Duration;
 use core::f32::consts::PI;
 
 /// Parameters of the filter, for a signal in gripper counts.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
     /// Cutoff of a signal at rest, in Hz. Lower: less jitter, more lag.
     pub min_cutoff: f32,

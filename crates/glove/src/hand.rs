@@ -115,7 +115,6 @@ pub const LIMITS: [(f32, f32); JOINT_COUNT] = {
 
 /// Which hand wears the glove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Side {
     /// Right hand: x is radial.
     #[default]

@@ -61,7 +61,6 @@ pub enum Contact {
 
 /// How far a gripper is from being able to move (gACT and gIMC, or gSTA).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Activation {
     /// Not activated, or in automatic release: nothing moves.
     Reset,

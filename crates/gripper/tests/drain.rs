@@ -3,7 +3,7 @@
 
 mod support;
 
-use gripper::link::{Config, Debt, Error, Event, Link, PortFault, Refused};
+use gripper::link::{Config, Error, Event, LateReply, Link, PortFault, Refused};
 use gripper::timing;
 use support::ask::*;
 use support::{CHARACTER, Line, at, run_link, settle};
@@ -19,20 +19,23 @@ fn after_a_timeout_the_same_look_is_refused_and_another_is_not() {
     let now = at(bench.line.now());
     assert_eq!(
         bench.link.start(&read(8), RESERVED, now),
-        Err(Refused::Owed)
+        Err(Refused::Ambiguous)
     );
-    assert_eq!(bench.link.debt(&read(8), now), Debt::Open);
-    assert_eq!(bench.link.debt(&exchange(8), now), Debt::None);
+    assert_eq!(bench.link.late_reply(&read(8), now), LateReply::Possible);
+    assert_eq!(bench.link.late_reply(&exchange(8), now), LateReply::None);
     // A later answer settles it as far as order goes; time ends it altogether.
     assert!(bench.ask(read(7), &status(7), CHARACTER).is_ok());
     assert!(matches!(
-        bench.link.debt(&read(8), at(bench.line.now())),
-        Debt::Settled { .. }
+        bench.link.late_reply(&read(8), at(bench.line.now())),
+        LateReply::Superseded { .. }
     ));
     bench
         .line
         .set_now(bench.line.now() + timing::MEMORY.as_ticks());
-    assert_eq!(bench.link.debt(&read(8), at(bench.line.now())), Debt::None);
+    assert_eq!(
+        bench.link.late_reply(&read(8), at(bench.line.now())),
+        LateReply::None
+    );
 }
 
 #[test]
@@ -60,7 +63,7 @@ fn a_late_reply_is_stale_and_never_the_answer() {
     assert!(bench.ask(read(8), &[], CHARACTER).is_err());
     // The late reply comes while the next request waits for its own.
     assert_eq!(bench.ask(read(7), &status(8), CHARACTER), Err(Error::Stale));
-    // A late reply in the quarantine is recognised too, and pays its debt.
+    // A late reply in the quarantine is recognised too, and is outstanding no longer.
     let mut bench = Bench::new();
     assert!(bench.ask(exchange(8), &[], CHARACTER).is_err());
     bench
@@ -70,8 +73,8 @@ fn a_late_reply_is_stale_and_never_the_answer() {
     let counters = bench.link.counters();
     assert_eq!((counters.stale, counters.noise), (1, 0));
     assert_eq!(
-        bench.link.debt(&exchange(8), at(bench.line.now())),
-        Debt::None
+        bench.link.late_reply(&exchange(8), at(bench.line.now())),
+        LateReply::None
     );
     assert!(
         bench
@@ -105,16 +108,19 @@ fn a_late_exception_is_stale_and_never_the_answer_to_the_next_request() {
         let counters = bench.link.counters();
         // The exception, and the reply behind it: nobody can say any more what it answers.
         assert_eq!((counters.stale, counters.exceptions), (2, 0));
-        // In the quarantine it is recognised too, and pays its debt.
+        // In the quarantine it is recognised too, and is outstanding no longer.
         let mut bench = Bench::new();
         assert!(bench.ask(before, &[], CHARACTER).is_err());
         bench.line.send(bench.line.now() + 300, CHARACTER, &late);
         settle(&bench.line, &mut bench.link);
         let counters = bench.link.counters();
         assert_eq!((counters.stale, counters.noise), (1, 0));
-        assert_eq!(bench.link.debt(&before, at(bench.line.now())), Debt::None);
+        assert_eq!(
+            bench.link.late_reply(&before, at(bench.line.now())),
+            LateReply::None
+        );
         assert_eq!(bench.ask(now_asked, &answer, CHARACTER), Ok(answer));
-        // With nothing owed the same bytes are the answer.
+        // With nothing outstanding the same bytes are the answer.
         let refused = refusal(now_asked.function());
         let outcome = bench.ask(now_asked, &refused, CHARACTER);
         assert!(matches!(outcome, Err(Error::Exception(_))), "{outcome:?}");

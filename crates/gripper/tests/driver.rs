@@ -184,7 +184,7 @@ fn after_silence_the_gripper_is_read_before_it_is_written_to() {
         let timeout = Err(Error::Link(link::Error::Timeout { received: 0 }));
         assert_eq!(outcome.unwrap() == timeout, cycle == 5);
     }
-    // Read, motions, the one that is lost, a read, motions again (in another look: 7 registers).
+    // Read, motions, the one that is lost, a read, motions again (in another form: 7 registers).
     assert_eq!(codes(&seen), [3, 23, 23, 23, 23, 23, 3, 23, 23, 23, 23, 23]);
     assert_eq!((seen[5][5], seen[7][5]), (8, 7));
 }

@@ -3,7 +3,7 @@
 
 mod support;
 
-use gripper::link::{Config, Echo, Error, Event, Field, Link, Refused};
+use gripper::link::{Config, Error, Event, Field, Link, LocalEcho, Refused};
 use gripper::registers::{COMMAND, STATUS};
 use gripper::rtu::{Exception, Registers, Request};
 use gripper::timing;
@@ -109,7 +109,7 @@ fn valid_frames_that_do_not_answer_name_the_field() {
         bench.ask(read(8), &status(8), CHARACTER).unwrap();
         assert_eq!(
             bench.ask(write(), &sealed(&body), CHARACTER),
-            Err(Error::Shape(Field::Echo))
+            Err(Error::Shape(Field::WriteReply))
         );
     }
 }
@@ -202,7 +202,7 @@ fn an_adapter_that_echoes_is_recognised_and_its_echo_taken_off() {
                 reply,
             );
         });
-        (outcome.expect("every wait ends"), link.echo())
+        (outcome.expect("every wait ends"), link.local_echo())
     };
     let single = Request::WriteSingle {
         address: COMMAND,
@@ -213,19 +213,19 @@ fn an_adapter_that_echoes_is_recognised_and_its_echo_taken_off() {
     for together in [false, true] {
         assert_eq!(
             ask(read(8), &status(8), together),
-            (Ok(status(8)), Echo::On)
+            (Ok(status(8)), LocalEcho::On)
         );
         assert_eq!(
             ask(exchange(8), &exchanged(), together),
-            (Ok(exchanged()), Echo::On)
+            (Ok(exchanged()), LocalEcho::On)
         );
         assert_eq!(
             ask(write(), &wrote, together),
-            (Ok(wrote.clone()), Echo::On)
+            (Ok(wrote.clone()), LocalEcho::On)
         );
         assert_eq!(
             ask(single, &single_reply, together),
-            (Ok(single_reply.clone()), Echo::On)
+            (Ok(single_reply.clone()), LocalEcho::On)
         );
     }
     // The slave is gone, the adapter still echoes: nobody takes that for an answer.
@@ -249,10 +249,10 @@ fn a_write_waits_until_a_read_has_shown_whether_the_adapter_echoes() {
     let now = at(bench.line.now());
     assert_eq!(
         bench.link.start(&write(), RESERVED, now),
-        Err(Refused::EchoUnknown)
+        Err(Refused::LocalEchoUnknown)
     );
     bench.ask(read(1), &status(1), CHARACTER).unwrap();
-    assert_eq!(bench.link.echo(), Echo::Off);
+    assert_eq!(bench.link.local_echo(), LocalEcho::Off);
     let wrote = sealed(&[9, 16, 3, 0xE8, 0, 8]);
     assert_eq!(bench.ask(write(), &wrote, CHARACTER), Ok(wrote));
 }

@@ -7,7 +7,7 @@ mod support;
 
 use bench::*;
 use gripper::driver::{Config, Family, Outcome, Task, ThreeFinger};
-use gripper::link::{self, Debt, Link};
+use gripper::link::{self, LateReply, Link};
 use gripper::registers::STATUS;
 use gripper::registers::two_finger::Model;
 use gripper::rtu::Request;
@@ -196,14 +196,14 @@ fn a_reply_that_an_adapter_kept_back_over_a_stall_answers_nothing_after_it() {
         link.poll(at(line.now())),
         Some(Err(link::Error::Timeout { .. }))
     ));
-    // The debt counts from now on, not from before the stall.
+    // The late reply counts from now on, not from before the stall.
     line.set_now(line.now() + 1_900_000);
-    assert_eq!(link.debt(&READ, at(line.now())), Debt::Open);
+    assert_eq!(link.late_reply(&READ, at(line.now())), LateReply::Possible);
     line.set_now(line.now() + 9_000_000);
     link.resume(at(line.now()));
-    assert_eq!(link.debt(&READ, at(line.now())), Debt::Open);
+    assert_eq!(link.late_reply(&READ, at(line.now())), LateReply::Possible);
     // And a line at rest is drained before it is used again.
     assert!(!link.is_free(at(line.now())));
     line.set_now(line.now() + timing::MEMORY.as_ticks());
-    assert_eq!(link.debt(&READ, at(line.now())), Debt::None);
+    assert_eq!(link.late_reply(&READ, at(line.now())), LateReply::None);
 }

@@ -47,7 +47,7 @@ fn a_gripper_that_never_answers_is_a_timeout_every_time() {
         let (asked, _) = sent.last().unwrap();
         assert!(line.now() <= asked + one_cycle());
     }
-    // It is asked a few times a second, never written to, and no look twice within the memory.
+    // It is asked a few times a second, never written to, and no form of request twice within the memory.
     assert!((60..=100).contains(&errors), "{errors} in 20 s");
     assert!(sent.iter().all(|(_, request)| request[1] == 3));
     for (k, (time, request)) in sent.iter().enumerate() {

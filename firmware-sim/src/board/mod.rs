@@ -95,7 +95,7 @@ impl Chip for Mps2 {
     fn machine(&mut self) -> Machine {
         Machine {
             bytes_lost: bytes_lost(),
-            stack_used: self.stack.look(),
+            stack_used: self.stack.scan(),
             restart: self.started,
         }
     }

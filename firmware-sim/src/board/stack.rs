@@ -1,19 +1,19 @@
-//! How deep the stack has been: the memory below it is painted at the start, and looked at for paint that is gone.
+//! How deep the stack has been: the memory below it is painted at the start, and searched for paint that is gone.
 
 /// Bytes below the stack's start that are painted.
 const DEPTH: usize = 64 * 1024;
 /// Bytes below the stack pointer that are left alone while painting.
 const MARGIN: usize = 256;
 const PAINT: u32 = 0xA5A5_5A5A;
-/// Words looked at in one go.
-const WORDS_A_LOOK: usize = 64;
+/// Words read in one go.
+const WORDS_A_SCAN: usize = 64;
 
 unsafe extern "C" {
     /// The stack's first address, from cortex-m-rt's linker script.
     static _stack_start: u32;
 }
 
-/// Looks for the deepest use, a few words at a time, from the bottom up.
+/// Searches for the deepest use, a few words at a time, from the bottom up.
 pub struct StackWatch {
     at: usize,
     used: u32,
@@ -41,8 +41,8 @@ impl StackWatch {
     }
 
     /// The next few words; returns the most bytes that were ever in use, as far as it is known.
-    pub fn look(&mut self) -> u32 {
-        for _ in 0..WORDS_A_LOOK {
+    pub fn scan(&mut self) -> u32 {
+        for _ in 0..WORDS_A_SCAN {
             // SAFETY: an aligned word of the painted memory; reading it has no effect.
             let painted = unsafe { core::ptr::read_volatile(self.at as *const u32) } == PAINT;
             if !painted || self.at + 4 >= top() {

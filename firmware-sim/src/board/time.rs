@@ -18,7 +18,7 @@ const CONTROL_ENABLE: u32 = 1;
 const TICKS_PER_MILLISECOND: u32 = CLOCK_HZ / 1_000;
 const TICKS_PER_MICROSECOND: u64 = CLOCK_HZ as u64 / 1_000_000;
 
-/// Ticks since the start at the newest look. The timer wraps every 171 s and is looked at every millisecond.
+/// Ticks since the start when the timer was read last. It wraps every 171 s and is read every millisecond.
 static TICKS: Mutex<Cell<u64>> = Mutex::new(Cell::new(0));
 
 /// Monotonic time since [`SystemTime::start`].
@@ -42,7 +42,7 @@ impl SystemTime {
 
     /// The time now, in microseconds.
     pub fn now(&mut self) -> Instant {
-        Instant::from_ticks(look() / TICKS_PER_MICROSECOND)
+        Instant::from_ticks(ticks() / TICKS_PER_MICROSECOND)
     }
 }
 
@@ -59,11 +59,11 @@ pub fn wait_for_interrupt() {
 
 /// Wakes the processor and sees every wrap of the timer; called by the SysTick exception only.
 pub(super) fn tick() {
-    look();
+    ticks();
 }
 
 /// Ticks since the start.
-fn look() -> u64 {
+fn ticks() -> u64 {
     critical_section::with(|section| {
         let ticks = TICKS.borrow(section);
         // The timer counts down from its greatest value.

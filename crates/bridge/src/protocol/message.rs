@@ -1,8 +1,10 @@
 //! What host and bridge say to each other, as postcard messages.
 //!
 //! The order of enum variants and struct fields **is** the wire format (postcard writes a variant's index and fields in
-//! order): append only, and raise [`VERSION`] when anything else changes. `docs/protocol.md` fixes it.
+//! order): append only, and raise [`VERSION`] when anything else changes. `docs/protocol.md` fixes it. A type from elsewhere
+//! in the bridge goes over the wire in the form that `protocol::wire` gives it.
 
+use super::wire;
 use crate::clutch::{Epoch, HeartbeatRefusal};
 use crate::config::SafeAction;
 use crate::{State, filter, store};
@@ -185,6 +187,7 @@ pub struct Status {
     /// Microseconds since the bridge started.
     pub now_us: u64,
     /// The supervisor's state.
+    #[serde(with = "wire::WireState")]
     pub state: State,
     /// Whether the clutch is closed, or a hold under it has not been released.
     pub engaged: bool,
@@ -204,8 +207,10 @@ pub struct Status {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct GripperStatus {
     /// gIMC.
+    #[serde(with = "wire::WireActivation")]
     pub activation: Activation,
     /// gFLT.
+    #[serde(with = "wire::WireFault")]
     pub fault: Fault,
     /// gPR, counts.
     pub echo: PerAxis<u8>,
@@ -271,6 +276,7 @@ pub struct Sample {
     /// Microseconds since the bridge started.
     pub now_us: u64,
     /// The supervisor's state.
+    #[serde(with = "wire::WireState")]
     pub state: State,
     /// Frames taken so far.
     pub frame_sequence: u32,
@@ -290,8 +296,10 @@ pub struct Sample {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Configuration {
     /// Which hand wears the glove.
+    #[serde(with = "wire::WireSide")]
     pub side: Side,
     /// Smoothing of the map's output.
+    #[serde(with = "wire::WireFilter")]
     pub filter: filter::Settings,
     /// See [`crate::Settings::fresh_frames`].
     pub fresh_frames: u8,
@@ -302,6 +310,7 @@ pub struct Configuration {
     /// See [`crate::Settings::lead`].
     pub lead: u8,
     /// See [`crate::Settings::safe_action`].
+    #[serde(with = "wire::WireSafeAction")]
     pub safe_action: SafeAction,
     /// See [`crate::Settings::open_rate`].
     pub open_rate: f32,
@@ -331,7 +340,7 @@ pub enum Refusal {
     /// The clutch is closed: release it first.
     Engaged,
     /// The weights store's word.
-    Store(store::Error),
+    Store(#[serde(with = "wire::WireStoreError")] store::Error),
     /// A setting out of its range.
     Configuration {
         /// Index in [`SETTING_NAMES`].
@@ -349,7 +358,7 @@ pub enum Refusal {
         least_ms: u16,
     },
     /// A heartbeat that keeps nothing closed.
-    Heartbeat(HeartbeatRefusal),
+    Heartbeat(#[serde(with = "wire::WireHeartbeatRefusal")] HeartbeatRefusal),
 }
 
 /// The names that [`Refusal::Configuration`] counts through.

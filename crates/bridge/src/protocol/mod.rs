@@ -11,5 +11,6 @@ mod outgoing;
 mod server;
 mod slow;
 mod telling;
+mod wire;
 
 pub use server::{Machine, Outcome, Server};

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlashErrorKind;
 use hae::image::{self, JointOrder};
 
 /// Why the store did not do what it was asked. The image that was active before stays active.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Error {
     /// The slot's flash has sizes the store cannot work with.
     Geometry {
@@ -95,7 +95,6 @@ pub enum Error {
         /// Where, bytes from the slot's start.
         offset: usize,
         /// Its kind.
-        #[serde(with = "flash_kind")]
         kind: NorFlashErrorKind,
     },
     /// The slot holds no whole image.
@@ -202,25 +201,3 @@ impl core::fmt::Display for Error {
 }
 
 impl core::error::Error for Error {}
-
-/// The kind of a flash error as one number: the outside crate's type has no serialised form of its own.
-mod flash_kind {
-    use embedded_storage::nor_flash::NorFlashErrorKind;
-    use serde::{Deserialize, Deserializer, Serializer};
-
-    pub fn serialize<S: Serializer>(kind: &NorFlashErrorKind, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_u8(match kind {
-            NorFlashErrorKind::NotAligned => 0,
-            NorFlashErrorKind::OutOfBounds => 1,
-            _ => 2,
-        })
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<NorFlashErrorKind, D::Error> {
-        Ok(match u8::deserialize(from)? {
-            0 => NorFlashErrorKind::NotAligned,
-            1 => NorFlashErrorKind::OutOfBounds,
-            _ => NorFlashErrorKind::Other,
-        })
-    }
-}

@@ -6,7 +6,7 @@ use crate::clutch::Position;
 use gripper::{Activation, registers::Fault};
 
 /// What the bridge is doing.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum State {
     /// The clutch is open. Before the first motion nothing is written to the gripper, after it the hold is repeated.
     Idle,
@@ -23,7 +23,7 @@ pub enum State {
 }
 
 /// Why motion is held while the clutch is closed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum HoldReason {
     /// The heartbeat of the clutch stopped without a release.
     HeartbeatLost,
@@ -52,7 +52,7 @@ pub enum HoldReason {
 }
 
 /// A fault of the gripper that ends motion until the clutch is opened.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum GripperFault {
     /// It reports a fault (gFLT).
     Reported(Fault),

@@ -5,7 +5,7 @@ use std::sync::mpsc::SyncSender;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::calibration::Try;
+use bridge::calibration::{Refusal, Try};
 use bridge::protocol::message::{Health, Restart, Sample, Status};
 use gripper::{Activation, Fault};
 use serde_json::json;
@@ -20,7 +20,7 @@ use host::chip::link::{Error, HostLink};
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
-use host::session::OnChip;
+use host::session::{OnChip, refused};
 use host::words;
 
 /// For the bridge to see that its clutch was opened.
@@ -244,22 +244,36 @@ fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
     let mut link = connect(at)?;
     if undo {
         link.undo_calibration().map_err(Failure::from)?;
+        let health = link.health().map_err(Failure::from)?;
+        if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
+            return Err(refused(why).into());
+        }
         tell.say(format_args!("the newest calibration was taken back"));
         if at.json {
-            return out::json(&link.health().map_err(Failure::from)?.calibration);
+            return calibration_json(health);
         }
         return Ok(());
     }
     // An older bridge is refused by name.
-    link.health().map_err(Failure::from)?;
+    let health = link.health().map_err(Failure::from)?;
     let mut run = start(link, None, interrupt)?;
     let taken = run.calibrate(&tell);
     let now = run.snapshot().map(|seen| seen.calibration);
     run.finish().judge(taken)?;
     if at.json {
-        return out::json(&now);
+        let calibration = now.unwrap_or(health.calibration);
+        return calibration_json(Health {
+            calibration,
+            ..health
+        });
     }
     Ok(())
+}
+
+/// Its part of the health, with the names of the wire.
+fn calibration_json(health: Health) -> Result<()> {
+    let health = serde_json::to_value(health)?;
+    out::json(&health["calibration"])
 }
 
 fn monitor(at: &BridgeAt, seconds: Option<Duration>, interrupt: &Interrupt) -> Result<()> {

@@ -3,7 +3,7 @@
 use super::family::{Block, Family, Snapshot, may_move};
 use super::task::Stage;
 use super::{Driver, Error};
-use crate::link::{self, Debt, Field, Refused};
+use crate::link::{self, Field, LateReply, Refused};
 use crate::registers::{COMMAND, Kind, STATUS};
 use crate::rtu::{Registers, Request, Response, function};
 use crate::{Duration, Instant, Motion, Status, timing};
@@ -68,13 +68,13 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         let mut block = self
             .snapshot
             .map_or(Block::default(), |snapshot| snapshot.raw);
-        let wide = self
+        let overlong = self
             .doing
             .is_some_and(|doing| doing.quantity > F::REGISTERS);
         let mut kind = Ok(());
         let answer = match self.link.poll(now)? {
-            Ok(Response::ReadHolding(values)) if wide => {
-                kind = self.identity.wide_answer(values.bytes());
+            Ok(Response::ReadHolding(values)) if overlong => {
+                kind = self.identity.overlong_answer(values.bytes());
                 Ok(())
             }
             Ok(
@@ -95,25 +95,25 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         };
         let doing = self.doing.take();
         if let Err(error) = answer {
-            return self.fail(error, doing, wide).map(Err);
+            return self.fail(error, doing, overlong).map(Err);
         }
         self.misses = 0;
         let doing = doing?;
         if F::PROBES.is_empty() && doing.quantity < F::WHOLE {
             // A sign of life, not a status.
             let stale = self.link.counters().stale;
-            kind = self.identity.short_answer(doing.quantity, stale);
+            kind = self.identity.partial_answer(doing.quantity, stale);
         }
         if let Err(kind) = kind {
             return self.refuse(kind).map(Err);
         }
-        if wide || doing.quantity < F::WHOLE {
+        if overlong || doing.quantity < F::WHOLE {
             return None;
         }
         let understood = self.understand(&block, &doing, now);
         if understood.is_ok() {
             self.identity.whole_answer();
-            self.identity.near_answer(doing.function);
+            self.identity.block_answer(doing.function);
         }
         Some(understood)
     }
@@ -129,14 +129,19 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
 
     /// What to make of a failure. That a read of more registers than the family has goes unanswered,
     /// or is refused, is as it should be.
-    fn fail(&mut self, error: link::Error, doing: Option<Doing<X>>, wide: bool) -> Option<Error> {
+    fn fail(
+        &mut self,
+        error: link::Error,
+        doing: Option<Doing<X>>,
+        overlong: bool,
+    ) -> Option<Error> {
         self.note_failure(error);
         match error {
-            link::Error::Timeout { received: 0 } if wide => {
-                self.identity.wide_silence();
+            link::Error::Timeout { received: 0 } if overlong => {
+                self.identity.overlong_silence();
                 return None;
             }
-            link::Error::Exception(code) if wide && self.identity.wide_refusal(code) => {
+            link::Error::Exception(code) if overlong && self.identity.overlong_refusal(code) => {
                 return None;
             }
             link::Error::Timeout { received: 0 }
@@ -202,13 +207,13 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             .decode(block, doing.sent, self.config.check_reserved)
             .and_then(|snapshot| {
                 if self.running.is_some() {
-                    self.echo.take(snapshot.echo);
+                    self.request_echo.take(snapshot.echo);
                     return Ok(snapshot);
                 }
-                if self.echo.believes(snapshot.echo) {
+                if self.request_echo.believes(snapshot.echo) {
                     Ok(snapshot)
                 } else {
-                    Err(Field::Echo)
+                    Err(Field::RequestEcho)
                 }
             });
         let mut snapshot = match judged {
@@ -238,11 +243,11 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             wanted = Doing::read((function::READ_HOLDING, F::REGISTERS));
             probe = self.probe(now);
         }
-        let Some(doing) = probe.or_else(|| self.with_fresh_look(wanted, now)) else {
-            // Every look is owed; the first debt ends in time.
+        let Some(doing) = probe.or_else(|| self.unambiguous(wanted, now)) else {
+            // A late reply could answer every request; the first is forgotten in time.
             self.next_start = self
                 .link
-                .debt_ends()
+                .late_replies_end()
                 .unwrap_or(now)
                 .max(timing::after(now, timing::TICK));
             return Ok(());
@@ -258,14 +263,15 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
                 self.verify = true;
                 return Err(link::Error::Port(fault).into());
             }
-            // Bytes nobody asked for came in this moment, or a debt appeared: again at next_due.
+            // Bytes nobody asked for came in this moment, or a late reply became possible: again at next_due.
             Err(_) => {
                 self.next_start = timing::after(now, timing::TICK);
                 return Ok(());
             }
         }
         if doing.function == function::READ_WRITE {
-            self.echo.note_sent(self.family.positions(&doing.block));
+            self.request_echo
+                .note_sent(self.family.positions(&doing.block));
         }
         if let Some(motion) = doing.motion {
             self.sent = Some(motion);
@@ -320,7 +326,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         };
         match self.running.map(|running| running.stage) {
             Some(Stage::Write(action)) => write(self.family.action(action, &before), None),
-            Some(Stage::Look | Stage::Watch) => read,
+            Some(Stage::Inspect | Stage::Watch) => read,
             None => match self.motion {
                 Some((motion, stamp))
                     if may_move(&before) && timing::since(now, stamp) <= timing::STALE_MOTION =>
@@ -336,11 +342,11 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
     fn probe(&mut self, now: Instant) -> Option<Doing<X>> {
         let from = self.identity.step;
         for step in from..from + F::PROBES.len() {
-            let Some(&look) = F::PROBES.get(step % F::PROBES.len().max(1)) else {
+            let Some(&request) = F::PROBES.get(step % F::PROBES.len().max(1)) else {
                 continue;
             };
-            let doing = Doing::read(look);
-            if self.link.debt(&doing.request(F::REGISTERS), now) != Debt::Open {
+            let doing = Doing::read(request);
+            if self.link.late_reply(&doing.request(F::REGISTERS), now) != LateReply::Possible {
                 self.identity.step = (step + 1) % F::PROBES.len().max(1);
                 return Some(doing);
             }
@@ -348,39 +354,41 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         None
     }
 
-    /// The wanted request in a look that no late reply can answer; a write that has none becomes a
-    /// read. Where a later answer has settled the debt, the look may be used again as a last resort.
-    fn with_fresh_look(&mut self, wanted: Doing<X>, now: Instant) -> Option<Doing<X>> {
-        let read = |&look: &(u8, u16)| Doing::read(look);
+    /// The wanted request in a form that no late reply can answer; a write that has none becomes a
+    /// read. Where a later answer has superseded the late reply, its form may be used again as a last
+    /// resort.
+    fn unambiguous(&mut self, wanted: Doing<X>, now: Instant) -> Option<Doing<X>> {
+        let read = |&form: &(u8, u16)| Doing::read(form);
         if wanted.function == function::READ_WRITE {
-            let looks = F::EXCHANGES
+            let forms = F::EXCHANGES
                 .iter()
                 .map(|&quantity| Doing { quantity, ..wanted });
-            if let Some(doing) = self.first_free(looks, now) {
+            if let Some(doing) = self.first_free(forms, now) {
                 return Some(doing);
             }
         }
-        // Short reads only where every whole one is owed: they are a sign of life, no status.
+        // Partial reads only where a late reply could answer every whole one: they are a sign of life, no
+        // status.
         let whole = |&&(_, quantity): &&(u8, u16)| quantity >= F::WHOLE;
         self.first_free(F::READS.iter().filter(whole).map(read), now)
             .or_else(|| self.first_free(F::READS.iter().map(read), now))
     }
 
-    /// The first of `looks` that no late reply can answer; else the one whose settled debt ends
-    /// first.
+    /// The first of `forms` that no late reply can answer; else the one whose superseded reply is
+    /// forgotten first.
     fn first_free(
         &mut self,
-        looks: impl Iterator<Item = Doing<X>>,
+        forms: impl Iterator<Item = Doing<X>>,
         now: Instant,
     ) -> Option<Doing<X>> {
         let mut best: Option<(Instant, Doing<X>)> = None;
-        for doing in looks {
-            match self.link.debt(&doing.request(F::REGISTERS), now) {
-                Debt::None => return Some(doing),
-                Debt::Settled { until } if best.is_none_or(|(ends, _)| until < ends) => {
+        for doing in forms {
+            match self.link.late_reply(&doing.request(F::REGISTERS), now) {
+                LateReply::None => return Some(doing),
+                LateReply::Superseded { until } if best.is_none_or(|(ends, _)| until < ends) => {
                     best = Some((until, doing))
                 }
-                Debt::Settled { .. } | Debt::Open => {}
+                LateReply::Superseded { .. } | LateReply::Possible => {}
             }
         }
         best.map(|(_, doing)| doing)

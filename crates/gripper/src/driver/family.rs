@@ -1,4 +1,4 @@
-//! What differs between the two families: blocks, fields, the looks a request can take.
+//! What differs between the two families: blocks, fields, the forms a request can take.
 
 use crate::link::Field;
 use crate::registers::{Axis, three_finger, two_finger};
@@ -46,7 +46,7 @@ pub trait Family<const X: usize>: sealed::Sealed {
     const WHOLE: u16;
     /// Status bits that are always 0.
     const RESERVED: &'static [u8];
-    /// Reads of different look, best first: function code and number of registers.
+    /// Reads whose replies differ in their signature, best first: function code and number of registers.
     const READS: &'static [(u8, u16)];
     /// Reads that tell the family before anything is written, in order; none where every whole
     /// status does.

@@ -13,7 +13,7 @@ use crate::rtu::{Exception, function};
 /// proves it, and before answers to FC03 do.
 const SILENT: (u8, u8) = (2, 6);
 /// Unanswered reads with FC04 after which a gripper whose eight registers say nothing counts as a
-/// 3-Finger one; short reads alone that are answered before it counts as none.
+/// 3-Finger one; partial reads alone that are answered before it counts as none.
 const PERSISTENT: u8 = 3;
 
 /// What is known of the family so far.
@@ -27,15 +27,15 @@ pub(super) struct Identity {
     foreign: bool,
     /// The next probe.
     pub(super) step: usize,
-    /// Wide reads without an answer; reads with FC03 answered after one.
+    /// Overlong reads without an answer; reads with FC03 answered after one.
     silent: u8,
-    near: u8,
+    answered: u8,
     /// Eight registers came, and all that only a 3-Finger gripper has are 0.
     zeros: bool,
     /// Reads with FC04 without an answer.
     unheard: u8,
     /// Reads of three registers or fewer answered since a longer one was, and late replies then.
-    short: u8,
+    partial: u8,
     stale: u32,
 }
 
@@ -56,7 +56,7 @@ impl Identity {
     }
 
     /// A read of more registers than the family has was answered.
-    pub(super) fn wide_answer(&mut self, values: &[u8]) -> Result<(), Kind> {
+    pub(super) fn overlong_answer(&mut self, values: &[u8]) -> Result<(), Kind> {
         let mut block = Block::default();
         block
             .iter_mut()
@@ -76,12 +76,12 @@ impl Identity {
         Kind::ThreeFinger
     }
 
-    pub(super) fn wide_silence(&mut self) {
+    pub(super) fn overlong_silence(&mut self) {
         self.silent = self.silent.saturating_add(1);
     }
 
-    /// Whether this refusal of a wide read is a device's own: then it has fewer registers.
-    pub(super) fn wide_refusal(&mut self, code: Exception) -> bool {
+    /// Whether this refusal of an overlong read is a device's own: then it has fewer registers.
+    pub(super) fn overlong_refusal(&mut self, code: Exception) -> bool {
         let own = matches!(
             code,
             Exception::ILLEGAL_ADDRESS | Exception::ILLEGAL_VALUE | Exception::ILLEGAL_FUNCTION
@@ -91,14 +91,14 @@ impl Identity {
     }
 
     /// A read of what the family has was answered.
-    pub(super) fn near_answer(&mut self, code: u8) {
+    pub(super) fn block_answer(&mut self, code: u8) {
         let (with_input, with_holding) = SILENT;
         if code == function::READ_INPUT {
             let silent = self.silent >= with_input && !self.foreign;
             self.known |= self.zeros || silent;
-        } else if self.silent > self.near && !self.foreign {
-            self.near += 1;
-            self.known |= self.near >= with_holding;
+        } else if self.silent > self.answered && !self.foreign {
+            self.answered += 1;
+            self.known |= self.answered >= with_holding;
         }
     }
 
@@ -113,21 +113,21 @@ impl Identity {
 
     /// A read too short for a status was answered, where whole ones are not. Replies that come late
     /// explain that too.
-    pub(super) fn short_answer(&mut self, quantity: u16, stale: u32) -> Result<(), Kind> {
+    pub(super) fn partial_answer(&mut self, quantity: u16, stale: u32) -> Result<(), Kind> {
         if quantity > 3 || stale != self.stale {
-            (self.short, self.stale) = (0, stale);
+            (self.partial, self.stale) = (0, stale);
             return Ok(());
         }
-        self.short += 1;
-        if self.short >= PERSISTENT {
-            self.short = 0;
+        self.partial += 1;
+        if self.partial >= PERSISTENT {
+            self.partial = 0;
             return Err(Kind::TwoFinger);
         }
         Ok(())
     }
 
     pub(super) fn whole_answer(&mut self) {
-        self.short = 0;
+        self.partial = 0;
     }
 
     /// Whether the family still has to be found out before a write.
@@ -143,8 +143,8 @@ mod tests {
     #[test]
     fn silence_proves_no_family_once_another_has_answered() {
         let proved = |mut identity: Identity| {
-            (0..SILENT.0).for_each(|_| identity.wide_silence());
-            identity.near_answer(function::READ_INPUT);
+            (0..SILENT.0).for_each(|_| identity.overlong_silence());
+            identity.block_answer(function::READ_INPUT);
             identity.known
         };
         assert!(proved(Identity::default()));

@@ -18,13 +18,13 @@
 //! - rMOD keeps what the gripper reports; rATR is not cleared under a release.
 //! - The echoed position must be one that was sent or was there before; anything else counts only
 //!   when said twice.
-//! - No reply is believed that could be the late one to an earlier request: requests change their
-//!   look (number of registers, function code) while one is owed.
+//! - No reply is believed that could be the late one to an earlier request: while one is
+//!   outstanding, requests ask for replies of another signature (number of registers, function code).
 
 mod cycle;
-mod echo;
 mod family;
 mod identity;
+mod request_echo;
 mod task;
 
 pub use family::{Control, Family, ThreeFingerFamily, TwoFingerFamily};
@@ -33,10 +33,10 @@ pub use task::{Failure, Outcome, Task};
 use crate::registers::{Kind, three_finger::Mode, two_finger};
 use crate::{Duration, Event, Gripper, Instant, Motion, Status, link, timing};
 use cycle::Doing;
-use echo::{EchoWatch, Recent};
 use embedded_io::{Read, ReadReady, Write};
 use family::Snapshot;
 use identity::Identity;
+use request_echo::{Recent, RequestEchoWatch};
 use task::Running;
 
 /// What a driver needs to know about its line.
@@ -154,7 +154,7 @@ pub struct Driver<S, F, const X: usize> {
     family: F,
     motion: Option<(Motion<X>, Instant)>,
     snapshot: Option<Snapshot<X>>,
-    echo: EchoWatch<X>,
+    request_echo: RequestEchoWatch<X>,
     doing: Option<Doing<X>>,
     /// The newest motion that left.
     sent: Option<Motion<X>>,
@@ -237,7 +237,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             family,
             motion: None,
             snapshot: None,
-            echo: EchoWatch::default(),
+            request_echo: RequestEchoWatch::default(),
             doing: None,
             sent: None,
             individual: Recent::default(),

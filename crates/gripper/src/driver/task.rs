@@ -1,6 +1,6 @@
 //! What a person asks for besides motions: activation, reset, automatic release, mode change.
 //!
-//! A task looks first (a fresh status), then writes if it has to, then watches until the gripper
+//! A task inspects first (a fresh status), then writes if it has to, then watches until the gripper
 //! says it is done. Every task has a deadline ([`timing`]).
 
 use super::family::{Action, Family, Snapshot};
@@ -97,7 +97,7 @@ impl core::fmt::Display for Failure {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Stage {
     /// Waiting for a fresh status to decide.
-    Look,
+    Inspect,
     /// Writing this until the status shows it.
     Write(Action),
     /// Reading until the gripper is done.
@@ -152,7 +152,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
         self.forget_individual();
         self.running = Some(Running {
             task,
-            stage: Stage::Look,
+            stage: Stage::Inspect,
             deadline: None,
             calm: 0,
             untaken: None,
@@ -236,10 +236,10 @@ fn activation<const X: usize>(stage: Stage, snapshot: &Snapshot<X>) -> Next {
         }
         (_, Activation::Ready) if !is_major(snapshot) => Next::Done,
         (Stage::Write(_) | Stage::Watch, _) if snapshot.activated => Next::Stay(Stage::Watch),
-        // A look.
+        // Inspecting.
         _ if !snapshot.activated => Next::Stay(Stage::Write(Action::Set)),
         _ if is_major(snapshot) => Next::Stay(Stage::Write(Action::Clear)),
-        _ if fault == Fault::Releasing => Next::Stay(Stage::Look),
+        _ if fault == Fault::Releasing => Next::Stay(Stage::Inspect),
         (_, Activation::Reset) => Next::Stay(Stage::Write(Action::Clear)),
         _ => Next::Stay(Stage::Watch),
     }
@@ -274,8 +274,8 @@ fn mode_change<const X: usize>(running: &mut Running, mode: Mode, snapshot: &Sna
         return Next::Fail(Failure::Fault(status.fault));
     }
     match running.stage {
-        Stage::Look if !ready => Next::Fail(Failure::NotReady(status.activation)),
-        Stage::Look => Next::Stay(Stage::Write(Action::Mode(mode))),
+        Stage::Inspect if !ready => Next::Fail(Failure::NotReady(status.activation)),
+        Stage::Inspect => Next::Stay(Stage::Write(Action::Mode(mode))),
         _ if !snapshot.activated => Next::Fail(Failure::NotReady(Activation::Reset)),
         // Seen changing to it, then seen ready; or ready for so long that there was nothing to do.
         Stage::Watch if there && ready => Next::Done,

@@ -1,6 +1,6 @@
 //! Whether the bytes received are the reply: length, CRC, then what the frame says.
 
-use super::{Echo, Error, Field, Link, MOST_SHIFTED, Signature};
+use super::{Error, Field, Link, LocalEcho, MOST_SHIFTED, Signature};
 use crate::rtu::{self, EXCEPTION_FRAME, Exception, Frame, Request, function};
 use crate::{Instant, timing};
 
@@ -13,7 +13,7 @@ pub(super) struct Pending {
     /// Bits of the register bytes that are always 0.
     reserved: &'static [u8],
     /// What a write's reply repeats after the function code.
-    echo: Option<[u8; 4]>,
+    repeats: Option<[u8; 4]>,
 }
 
 /// What the bytes so far amount to.
@@ -38,7 +38,7 @@ impl Pending {
             let ([a, b], [c, d]) = (first.to_be_bytes(), second.to_be_bytes());
             Some([a, b, c, d])
         };
-        let echo = match *request {
+        let repeats = match *request {
             Request::WriteSingle { address, value } => words(address, value),
             Request::WriteMultiple { address, values } => words(address, values.quantity()),
             _ => None,
@@ -48,15 +48,15 @@ impl Pending {
             reply: Signature::of(unit, request),
             sent,
             reserved,
-            echo,
+            repeats,
         }
     }
 
     pub(super) fn is_write(&self) -> bool {
-        self.echo.is_some()
+        self.repeats.is_some()
     }
 
-    /// The checks after the CRC, in order: address, function, byte count, reserved bits, echo.
+    /// The checks after the CRC, in order: address, function, byte count, reserved bits, what a write repeats.
     fn check(&self, frame: &Frame<'_>) -> Result<(), Field> {
         let [unit, code, third] = self.reply.head;
         if frame.unit() != unit {
@@ -66,11 +66,11 @@ impl Pending {
             return Err(Field::Function);
         }
         let data = frame.pdu().get(1..).unwrap_or(&[]);
-        if let Some(echo) = self.echo {
-            return if data == echo {
+        if let Some(repeats) = self.repeats {
+            return if data == repeats {
                 Ok(())
             } else {
-                Err(Field::Echo)
+                Err(Field::WriteReply)
             };
         }
         let Some((&count, values)) = data.split_first() else {
@@ -91,21 +91,21 @@ impl Pending {
 }
 
 impl<S> Link<S> {
-    /// Judges what has been received, after taking an adapter's echo off its front.
+    /// Judges what has been received, after taking an adapter's local echo off its front.
     pub(super) fn judge(&mut self, pending: &Pending, now: Instant) -> Verdict {
-        if self.strip_echo(pending) {
+        if self.strip_local_echo(pending) {
             return Verdict::More;
         }
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
-        if let Some(owed) = self.owed.late_exception(bytes) {
-            self.note_late(owed, now);
+        if let Some(late) = self.outstanding.late_exception(bytes) {
+            self.note_late(late, now);
             return Verdict::Wrong(Error::Stale);
         }
         if let Some(verdict) = exception(bytes, pending) {
             return verdict;
         }
-        let late = self.owed.matching(bytes, Some(pending.reply));
-        let length = late.map_or(pending.reply.length, |owed| owed.length);
+        let late = self.outstanding.matching(bytes, Some(pending.reply));
+        let length = late.map_or(pending.reply.length, |late| late.length);
         let Some(frame) = bytes.get(..length) else {
             return Verdict::More;
         };
@@ -114,19 +114,19 @@ impl<S> Link<S> {
             Ok(frame) => match (late, pending.check(&frame)) {
                 (None, Ok(())) => return Verdict::Reply,
                 (None, Err(field)) => return Verdict::Wrong(Error::Shape(field)),
-                (Some(owed), _) => self.note_late(owed, now),
+                (Some(late), _) => self.note_late(late, now),
             },
         }
         Verdict::Wrong(Error::Stale)
     }
 
-    /// The reply of this look has come late: its debt is paid.
-    pub(super) fn note_late(&mut self, owed: Signature, now: Instant) {
-        if let Some(sent) = self.owed.sent(owed) {
+    /// The outstanding reply of this signature has come late.
+    pub(super) fn note_late(&mut self, reply: Signature, now: Instant) {
+        if let Some(sent) = self.outstanding.sent(reply) {
             let late = timing::since(now, sent);
             self.lateness = Some(self.lateness.map_or(late, |before| before.max(late)));
         }
-        self.owed.pay(owed);
+        self.outstanding.arrived(reply);
     }
 
     /// Forgets the first `count` bytes received.
@@ -145,9 +145,9 @@ impl<S> Link<S> {
     ///
     /// A read's reply differs from its request in the third byte (a byte count, where the request
     /// has the high byte of the address), so the bytes decide. A write's reply may be its request
-    /// byte for byte (FC06): there only a known echo counts.
-    fn strip_echo(&mut self, pending: &Pending) -> bool {
-        if pending.is_write() && self.echo != Echo::On || self.stripped {
+    /// byte for byte (FC06): there only a known local echo counts.
+    fn strip_local_echo(&mut self, pending: &Pending) -> bool {
+        if pending.is_write() && self.local_echo != LocalEcho::On || self.stripped {
             return false;
         }
         let request = self.request.get(..pending.request_len).unwrap_or(&[]);
@@ -161,7 +161,7 @@ impl<S> Link<S> {
         }
         let echoed = request.len();
         self.drop_front(echoed);
-        self.echo = Echo::On;
+        self.local_echo = LocalEcho::On;
         self.stripped = true;
         self.length == 0
     }

@@ -7,32 +7,32 @@
 //! - A reply counts only if it was seen to start and to end in time. Whoever polls too late to see that
 //!   does not know how long it lay there, and asks anew.
 //! - The CRC is judged first, over that length; then address, function, byte count, reserved bits
-//!   and the echo of a write. Five bytes are an exception only if their own CRC fits.
+//!   and what the reply to a write repeats. Five bytes are an exception only if their own CRC fits.
 //! - After any failure the line is drained: nothing is sent before the reply that failed can no
 //!   longer start, and before a silence counted from the last poll that saw bytes.
-//! - A request that went unanswered leaves a [`Debt`]: no request whose reply could be mistaken for
+//! - While a reply is outstanding ([`LateReply`]) no request whose reply could be mistaken for
 //!   the late one is sent for [`timing::MEMORY`].
-//! - An RS-485 adapter that echoes is recognised by a read, whose request can never be its reply.
+//! - An RS-485 adapter with a local echo is recognised by a read, whose request can never be its reply.
 //!   Writes, whose reply may look like their request, wait for that knowledge.
 //!
 //! The link reads no clock and never blocks: it reads only what `read_ready` announces and expects
 //! the port to take a request (at most 64 bytes) into its queue.
 
 mod judge;
-mod owed;
+mod outstanding;
 mod port;
 mod trace;
 mod types;
 
-pub use owed::Debt;
+pub use outstanding::LateReply;
 pub use trace::{Counters, Entry, Event, TRACE_BYTES, TRACE_LEN, Trace};
-pub use types::{Config, Echo, Error, Field, MOST_SHIFTED, PortFault, Refused};
+pub use types::{Config, Error, Field, LocalEcho, MOST_SHIFTED, PortFault, Refused};
 
 use crate::rtu::{Request, Response};
 use crate::{Duration, Instant, timing};
 use embedded_io::{Read, ReadReady, Write};
 use judge::{Pending, Verdict};
-use owed::{Owed, Signature};
+use outstanding::{Outstanding, Signature};
 
 /// Longest request the link sends, bytes.
 pub const MAX_REQUEST: usize = 64;
@@ -69,13 +69,13 @@ pub struct Link<S> {
     serial: S,
     config: Config,
     state: State,
-    echo: Echo,
+    local_echo: LocalEcho,
     /// The echo of the request under way has been taken off.
     stripped: bool,
     received: [u8; MAX_REQUEST + MAX_REPLY],
     length: usize,
     request: [u8; MAX_REQUEST],
-    owed: Owed,
+    outstanding: Outstanding,
     counters: Counters,
     /// The longest time from a request to the reply that came too late.
     lateness: Option<Duration>,
@@ -91,12 +91,12 @@ impl<S: Read + ReadReady + Write> Link<S> {
             state: State::Resting {
                 until: Instant::from_ticks(0),
             },
-            echo: Echo::Unknown,
+            local_echo: LocalEcho::Unknown,
             stripped: false,
             received: [0; MAX_REQUEST + MAX_REPLY],
             length: 0,
             request: [0; MAX_REQUEST],
-            owed: Owed::default(),
+            outstanding: Outstanding::default(),
             counters: Counters::default(),
             lateness: None,
             trace: Trace::default(),
@@ -133,20 +133,21 @@ impl<S: Read + ReadReady + Write> Link<S> {
         &self.trace
     }
 
-    /// Whether the adapter echoes, as far as known.
-    pub fn echo(&self) -> Echo {
-        self.echo
+    /// Whether the adapter has a local echo, as far as known.
+    pub fn local_echo(&self) -> LocalEcho {
+        self.local_echo
     }
 
     /// Whether a late reply could be taken for the answer to `request`.
-    pub fn debt(&mut self, request: &Request<'_>, now: Instant) -> Debt {
-        self.owed.expire(now);
-        self.owed.debt(Signature::of(self.config.unit, request))
+    pub fn late_reply(&mut self, request: &Request<'_>, now: Instant) -> LateReply {
+        self.outstanding.expire(now);
+        self.outstanding
+            .late_reply(Signature::of(self.config.unit, request))
     }
 
-    /// When the first debt ends, if there is one.
-    pub fn debt_ends(&self) -> Option<Instant> {
-        self.owed.earliest()
+    /// When the first outstanding reply is forgotten, if there is one.
+    pub fn late_replies_end(&self) -> Option<Instant> {
+        self.outstanding.earliest()
     }
 
     /// Whether a request can be sent at `now` as far as the line goes.
@@ -200,11 +201,11 @@ impl<S: Read + ReadReady + Write> Link<S> {
         if pending.reply.length > MAX_REPLY {
             return Err(Refused::Length);
         }
-        if pending.is_write() && self.echo == Echo::Unknown {
-            return Err(Refused::EchoUnknown);
+        if pending.is_write() && self.local_echo == LocalEcho::Unknown {
+            return Err(Refused::LocalEchoUnknown);
         }
-        if self.debt(request, now) == Debt::Open {
-            return Err(Refused::Owed);
+        if self.late_reply(request, now) == LateReply::Possible {
+            return Err(Refused::Ambiguous);
         }
         request
             .emit(self.config.unit, &mut self.request)
@@ -257,9 +258,9 @@ impl<S: Read + ReadReady + Write> Link<S> {
 
     /// Nobody has polled for longer than [`Config::longest_exchange`]: a process that stood still, a
     /// machine that slept. What lies in the port, and what an adapter kept back meanwhile, is thrown
-    /// away before anything is sent; what was owed is owed anew.
+    /// away before anything is sent; what was outstanding is so anew.
     pub fn resume(&mut self, now: Instant) {
-        self.owed.prolong(now);
+        self.outstanding.prolong(now);
         let rest = timing::after(now, self.quarantine());
         match &mut self.state {
             State::Idle { .. } => self.begin_drain(now, rest),
@@ -278,7 +279,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
     /// drained as after any other failure.
     pub fn reject(&mut self, field: Field, request: &Request<'_>, now: Instant) -> Error {
         self.counters.replies = self.counters.replies.wrapping_sub(1);
-        self.owed
+        self.outstanding
             .add(Signature::of(self.config.unit, request), now, now);
         self.fail(Error::Shape(field), now, now)
     }
@@ -295,7 +296,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
         let verdict = if now > due(self.length) {
             Verdict::More
         } else if let Err(fault) = self.receive() {
-            self.owed.add(pending.reply, pending.sent, now);
+            self.outstanding.add(pending.reply, pending.sent, now);
             return Some(Err(Error::Port(self.fail_port(fault, now))));
         } else {
             self.judge(&pending, now)
@@ -315,8 +316,8 @@ impl<S: Read + ReadReady + Write> Link<S> {
             _ => first_due,
         };
         if !matches!(error, Error::Exception(_)) {
-            self.owed.add(pending.reply, pending.sent, now);
-            self.echo = Echo::Unknown;
+            self.outstanding.add(pending.reply, pending.sent, now);
+            self.local_echo = LocalEcho::Unknown;
         }
         Some(Err(self.fail(error, now, rest)))
     }
@@ -324,9 +325,9 @@ impl<S: Read + ReadReady + Write> Link<S> {
     fn accept(&mut self, pending: &Pending, now: Instant) -> usize {
         let (reply, all) = (pending.reply.length, self.length);
         self.counters.replies = self.counters.replies.wrapping_add(1);
-        self.owed.settle_all();
-        if !pending.is_write() && self.echo == Echo::Unknown {
-            self.echo = Echo::Off;
+        self.outstanding.supersede_all();
+        if !pending.is_write() && self.local_echo == LocalEcho::Unknown {
+            self.local_echo = LocalEcho::Off;
         }
         let frame = self.received.get(..reply).unwrap_or(&[]);
         self.trace.note(now, Event::Received, frame);

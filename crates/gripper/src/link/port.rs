@@ -137,14 +137,14 @@ impl<S: Read + ReadReady + Write> Link<S> {
         Ok((count as u32, self.recognise_late(now) as u32))
     }
 
-    /// Pays the debt whose reply, or refusal, lies at the front of the drained bytes; returns its
+    /// Notes the outstanding reply, or its refusal, at the front of the drained bytes; returns its
     /// length, or 0.
     fn recognise_late(&mut self, now: Instant) -> usize {
         let bytes = self.received.get(..self.length).unwrap_or(&[]);
-        let (owed, length) = match self.owed.late_exception(bytes) {
-            Some(owed) => (owed, EXCEPTION_FRAME),
-            None => match self.owed.matching(bytes, None) {
-                Some(owed) => (owed, owed.length),
+        let (reply, length) = match self.outstanding.late_exception(bytes) {
+            Some(reply) => (reply, EXCEPTION_FRAME),
+            None => match self.outstanding.matching(bytes, None) {
+                Some(reply) => (reply, reply.length),
                 None => return 0,
             },
         };
@@ -156,7 +156,7 @@ impl<S: Read + ReadReady + Write> Link<S> {
         }
         self.trace.note(now, Event::Late, frame);
         self.counters.count(Error::Stale);
-        self.note_late(owed, now);
+        self.note_late(reply, now);
         self.drop_front(length);
         length
     }

@@ -73,9 +73,10 @@ pub enum Field {
     ByteCount,
     /// A bit that is always 0 is set.
     Reserved,
-    /// A write's address, quantity or value is not what was sent; or the gripper repeats a position
-    /// nobody asked for.
-    Echo,
+    /// A write's address, quantity or value is not what was sent.
+    WriteReply,
+    /// The gripper echoes a position request (gPRx) that nobody made.
+    RequestEcho,
 }
 
 /// What failed at the port itself.
@@ -139,7 +140,9 @@ impl core::fmt::Display for Error {
                     Field::Function => "another function code",
                     Field::ByteCount => "another byte count",
                     Field::Reserved => "a reserved bit is set",
-                    Field::Echo => "it repeats something that was not sent",
+                    Field::WriteReply | Field::RequestEcho => {
+                        "it repeats something that was not sent"
+                    }
                 };
                 write!(f, "a valid frame does not answer the request: {what}")
             }
@@ -184,19 +187,19 @@ impl core::error::Error for Error {}
 pub enum Refused {
     /// A transaction, a drain or a silence is under way; ask again at [`next_due`](super::Link::next_due).
     Busy,
-    /// A late reply could be taken for the answer: send one of another look, or wait.
-    Owed,
+    /// A late reply could be taken for the answer: send one whose reply has another signature, or wait.
+    Ambiguous,
     /// A write, while it is not known whether the adapter echoes: read once first.
-    EchoUnknown,
+    LocalEchoUnknown,
     /// The request or its reply is longer than the link's buffers, or cannot be put into bytes.
     Length,
     /// The port failed.
     Port(PortFault),
 }
 
-/// Whether the adapter sends back what it is given.
+/// Whether an RS-485 adapter sends back what it is given.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Echo {
+pub enum LocalEcho {
     /// No read has been answered yet.
     Unknown,
     /// It does not.

@@ -16,7 +16,6 @@ pub enum Severity {
 /// The fault a gripper reports (gFLT, 4 bits). The same number means different things to different
 /// families: [`Fault::three_finger`], [`Fault::two_finger`].
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Fault {
     /// 00.
     None,

@@ -3,7 +3,7 @@
 
 use super::{Line, Slave, at};
 use gripper::driver::{Config, Control, ThreeFinger, TwoFinger};
-use gripper::link::{self, Debt, Link};
+use gripper::link::{self, LateReply, Link};
 use gripper::registers::STATUS;
 use gripper::registers::three_finger::Mode;
 use gripper::registers::two_finger::Model;
@@ -79,8 +79,8 @@ pub fn link(data: &[u8]) -> Seen {
     let mut seen = Seen::default();
     // The reply to the request under way; the one to an unanswered request before it, and since when.
     let mut current: Option<Vec<u8>> = None;
-    let mut owed: Option<(Vec<u8>, u64)> = None;
-    // Whether anything but the owed reply has been put on the line since the request.
+    let mut outstanding: Option<(Vec<u8>, u64)> = None;
+    // Whether anything but the outstanding reply has been put on the line since the request.
     let (mut waiting, mut fresh, mut broken) = (false, true, false);
     while !script.0.is_empty() {
         let now = at(line.now());
@@ -90,7 +90,7 @@ pub fn link(data: &[u8]) -> Seen {
                     assert!(waiting, "an answer without a request");
                     assert!(fresh, "an earlier reply taken for the answer");
                     seen.answers += 1;
-                    (waiting, owed) = (false, None);
+                    (waiting, outstanding) = (false, None);
                 }
                 Some(Err(link::Error::Noise(_) | link::Error::Port(_))) => waiting = false,
                 Some(Err(error)) => {
@@ -98,7 +98,7 @@ pub fn link(data: &[u8]) -> Seen {
                     seen.failures += 1;
                     waiting = false;
                     if matches!(error, link::Error::Timeout { .. }) {
-                        owed = current.take().map(|reply| (reply, line.now()));
+                        outstanding = current.take().map(|reply| (reply, line.now()));
                     }
                 }
                 None => {}
@@ -139,8 +139,11 @@ pub fn link(data: &[u8]) -> Seen {
                 if !waiting && !broken && line.next_byte().is_none() {
                     super::settle(&line, &mut link);
                 }
-                // A settled look would be safe only against replies in order.
-                let settled = matches!(link.debt(&request, at(line.now())), Debt::Settled { .. });
+                // A superseded signature would be safe only against replies in order.
+                let settled = matches!(
+                    link.late_reply(&request, at(line.now())),
+                    LateReply::Superseded { .. }
+                );
                 if !settled && link.start(&request, &[], at(line.now())).is_ok() {
                     let (_, bytes) = line.take_written().pop().unwrap();
                     current = Some(slave.answer(&bytes));
@@ -158,7 +161,7 @@ pub fn link(data: &[u8]) -> Seen {
             9 => {
                 let spacing = u64::from(script.byte());
                 // It comes once.
-                if let Some((reply, since)) = owed.take()
+                if let Some((reply, since)) = outstanding.take()
                     && line.now() + 21 * spacing < since + timing::MEMORY.as_ticks()
                 {
                     line.send(line.now(), spacing, &reply);

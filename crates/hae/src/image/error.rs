@@ -7,7 +7,6 @@ use super::{FORMAT, JointOrder, MAX_HIDDEN, MAX_INPUTS, MAX_OUTPUTS};
 /// Why bytes are not an image that can be used, or parameters cannot become one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Error {
     /// Fewer bytes than the header, or than the length the header states.
     Truncated {
@@ -108,7 +107,6 @@ pub enum Error {
     /// A parameter slice's length does not fit the shape.
     ParameterLength {
         /// `w1`, `b1`, `w2` or `b2`; not part of the serialised form, since only encoding meets this error.
-        #[cfg_attr(feature = "serde", serde(skip))]
         name: &'static str,
         /// Its length.
         found: usize,

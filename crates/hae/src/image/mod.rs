@@ -58,7 +58,6 @@ pub(crate) mod offset {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[non_exhaustive]
 #[repr(u16)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum JointOrder {
     /// The 25 joint angles of a hand in radians, `thumb_cmc_flex` … `little_dip_flex`.
     Hand25 = 1,

@@ -10,6 +10,7 @@
 
 pub(crate) mod backward;
 pub(crate) mod forward;
+mod subsets;
 #[cfg(test)]
 mod tests;
 

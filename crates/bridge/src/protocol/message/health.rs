@@ -2,14 +2,17 @@
 
 use crate::calibration::CalibrationState;
 use crate::clutch::Position;
+use crate::protocol::wire;
 use serde::{Deserialize, Serialize};
 
 /// What keeps a bridge from moving, beside its devices.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Health {
     /// Where the clutch is.
+    #[serde(with = "wire::WirePosition")]
     pub clutch: Position,
     /// Whether the glove is calibrated, and how the newest try ended.
+    #[serde(with = "wire::WireCalibrationState")]
     pub calibration: CalibrationState,
     /// Why the bridge started.
     pub restart: Restart,

@@ -1,4 +1,4 @@
-//! Whether an echoed position can be true: it was there before, or it was sent.
+//! Whether an echoed position request (gPRx) can be true: it was there before, or it was sent.
 
 use heapless::Deque;
 
@@ -36,15 +36,15 @@ impl<const X: usize> Recent<X> {
     }
 }
 
-/// What the gripper may echo.
+/// What the gripper may echo as the position asked for (gPRx).
 #[derive(Debug)]
-pub(super) struct EchoWatch<const X: usize> {
+pub(super) struct RequestEchoWatch<const X: usize> {
     known: Option<[u8; X]>,
     sent: Recent<X>,
     doubted: Option<[u8; X]>,
 }
 
-impl<const X: usize> Default for EchoWatch<X> {
+impl<const X: usize> Default for RequestEchoWatch<X> {
     fn default() -> Self {
         Self {
             known: None,
@@ -54,7 +54,7 @@ impl<const X: usize> Default for EchoWatch<X> {
     }
 }
 
-impl<const X: usize> EchoWatch<X> {
+impl<const X: usize> RequestEchoWatch<X> {
     /// These positions are in a command that leaves now.
     pub(super) fn note_sent(&mut self, position: [u8; X]) {
         self.sent.note(position);
@@ -94,7 +94,7 @@ mod tests {
 
     #[test]
     fn only_what_was_there_or_was_sent_is_believed_at_once() {
-        let mut watch = EchoWatch::default();
+        let mut watch = RequestEchoWatch::default();
         assert!(watch.believes([10, 20]));
         assert!(!watch.believes([11, 20]));
         watch.note_sent([30, 40]);
@@ -105,7 +105,7 @@ mod tests {
 
     #[test]
     fn a_foreign_echo_is_believed_when_said_twice_in_a_row() {
-        let mut watch = EchoWatch::default();
+        let mut watch = RequestEchoWatch::default();
         assert!(watch.believes([1]));
         assert!(!watch.believes([7]) && !watch.believes([9]) && watch.believes([9]));
         assert!(watch.believes([9]) && !watch.believes([1]));
