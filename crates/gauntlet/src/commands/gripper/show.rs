@@ -20,6 +20,8 @@ const WATCH_SILENCE: Duration = Duration::from_secs(1);
 /// And says at least this often that it still does.
 const WATCH_BEAT: Duration = Duration::from_secs(1);
 
+/// The longest a change of mode takes, and as long again.
+const MODE_WAIT: Duration = Duration::from_secs(15);
 /// Statuses that are compared before one is shown, and the longest wait for them.
 const COMPARED: u8 = 8;
 const COMPARE_WAIT: Duration = Duration::from_millis(300);
@@ -49,6 +51,10 @@ impl<B> Doing<'_, B> {
                 }
                 Failure::new("the gripper stopped answering", self.target.doctor())
             })?;
+        let first = match claim {
+            Some(_) => self.mode_changed(first),
+            None => first,
+        };
         let (status, jumps) = self.compare(first);
         self.show_status(&status)?;
         if let Some((what, bears_out)) = claim
@@ -67,6 +73,28 @@ impl<B> Doing<'_, B> {
             .into());
         }
         Ok(())
+    }
+
+    /// A gripper that was in another mode goes on to the basic one once it is activated: its scissor moves until then.
+    fn mode_changed<const X: usize>(&mut self, first: Status<X>) -> Status<X>
+    where
+        B: Bench<X>,
+    {
+        if first.activation != Activation::ChangingMode {
+            return first;
+        }
+        let mut newest = first;
+        let waiter = self.waiter.clone();
+        waiter.pump(&mut self.driver, MODE_WAIT, |_, _, heard| {
+            if let Some(Ok(status)) = heard {
+                newest = status;
+                if status.activation != Activation::ChangingMode {
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        newest
     }
 
     /// The newest of some statuses, and whether their positions jump.
