@@ -432,16 +432,14 @@ fn a_register_of_the_glove_that_reads_back_otherwise_is_named_by_doctor_and_tele
 }
 
 #[test]
-fn teleop_refuses_a_gripper_that_cannot_follow_and_says_what_moves_it() {
-    let model = ["--model", "none.safetensors", "--gripper-model", "hande"];
+fn teleop_refuses_a_map_that_does_not_fit_the_gripper_before_it_opens_a_port() {
+    let model = support::model().to_str().unwrap();
+    let options = ["--model", model, "--gripper-model", "hande"];
     let ports = ["teleop", "--glove", "/dev/a", "--gripper", "/dev/b"];
-    let output = run(&[&ports[..], &model].concat());
-    assert_eq!(output.status.code(), Some(2));
+    let output = run(&[&ports[..], &options].concat());
+    assert_eq!(output.status.code(), Some(1));
     contains(
         &text(&output.stderr),
-        &[
-            "3-Finger gripper only",
-            "gauntlet gripper move --gripper /dev/b --gripper-model hande",
-        ],
+        &["gives 4 positions", "Hand-E", "--gripper-model 3f"],
     );
 }

@@ -217,7 +217,9 @@ impl<const X: usize> Believed<X> {
         let stuck = |axis: usize, track: &Track| {
             let free = match status.contact.get(axis) {
                 Some(Contact::Moving) => true,
-                Some(Contact::AtPosition) => axis != SCISSOR && FREE.contains(&track.position),
+                Some(Contact::AtPosition) => {
+                    axis != SCISSOR && free_range(X).contains(&track.position)
+                }
                 _ => false,
             };
             free && elapsed(now, track.stands) >= timing::STANDS_AFTER
@@ -245,6 +247,16 @@ impl<const X: usize> Believed<X> {
 const SCISSOR: usize = 3;
 /// Where no software limit of a finger lies: fully open reads 6 to 7 (hardware note, section 1), closed some counts below 255.
 const FREE: core::ops::RangeInclusive<u8> = 16..=234;
+/// The same of a 2-Finger gripper, which reads some 3 to 13 fully open and 225 to 230 fully closed.
+const FREE_TWO_FINGER: core::ops::RangeInclusive<u8> = 24..=214;
+
+const fn free_range(axes: usize) -> core::ops::RangeInclusive<u8> {
+    match axes {
+        1 => FREE_TWO_FINGER,
+        _ => FREE,
+    }
+}
+
 /// How far from the way between its last positions and commands a gripper may be found, counts.
 const BESIDE: u8 = 20;
 /// Counts by which a standing axis may flicker.

@@ -10,7 +10,7 @@ use crate::words::axis_words;
 /// Counts of position that are a motion: more than noise of the measured position.
 pub const MOVED_COUNTS: u8 = 4;
 /// Told to be so many counts away a finger has somewhere to go: its software limits lie nearer than this to its range's ends.
-const AWAY_COUNTS: u8 = 24;
+const AWAY_COUNTS: u8 = 30;
 /// Told so for so long in all a gripper that works has moved, µs.
 const LONG_US: u64 = 2_000_000;
 /// Between two looks that are farther apart nobody knows what happened, µs.
