@@ -279,9 +279,4 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     pub fn platform_mut(&mut self) -> &mut B {
         &mut self.board
     }
-
-    /// Gives everything back.
-    pub fn into_parts(self) -> (B, Scanner<B::Glove>, B::Gripper, WeightsStore<B::Flash>) {
-        (self.board, self.scanner, self.gripper, self.store)
-    }
 }
