@@ -69,14 +69,6 @@ pub struct App<B: Board<X>, const X: usize> {
     events: heapless::Deque<Event, { event::CAPACITY }>,
 }
 
-/// A board, and the devices that an [`App`] owned.
-pub type Parts<B, const X: usize> = (
-    B,
-    Scanner<<B as Board<X>>::Glove>,
-    <B as Board<X>>::Gripper,
-    WeightsStore<<B as Board<X>>::Flash>,
-);
-
 impl<B: Board<X>, const X: usize> core::fmt::Debug for App<B, X> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.debug_struct("App")
@@ -286,10 +278,5 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     /// The board, as the clock and the sleep that it is.
     pub fn platform_mut(&mut self) -> &mut B {
         &mut self.board
-    }
-
-    /// Gives everything back.
-    pub fn into_parts(self) -> Parts<B, X> {
-        (self.board, self.scanner, self.gripper, self.store)
     }
 }
