@@ -14,8 +14,8 @@ use crate::random;
 pub const BETWEEN: f32 = 8.0;
 /// How fast somebody else moves the fingers, counts a second: slower than the gripper could, or the positions would be doubted.
 const PUSHED: f32 = 150.0;
-/// How far at most.
-const FARTHEST: f32 = 90.0;
+/// How far at most: a gripper found more than 20 counts from where it was left waits for a person.
+const FARTHEST: f32 = 16.0;
 /// What a stopped process wrote last has arrived by then.
 const ARRIVED: Duration = Duration::from_millis(30);
 /// By then a process that goes on has written, if it does.

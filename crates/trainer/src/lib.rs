@@ -4,7 +4,7 @@
 //! Eq. n and § n cite "A learning-based harmonic mapping: Framework, assessment, and case study of human-to-robot hand
 //! pose mapping"; where the paper leaves a choice open, the module that makes it says so. The mathematical half:
 //! [`network`], [`cost`], [`optimizer`], [`algorithm`], [`measures`], [`neighbours`], with the fast arithmetic in
-//! `kernel`. The other half brings data in and models out: [`data`], [`motion`], [`operator`], [`model`], [`shapes`].
+//! `kernel`. The other half brings data in and models out: [`data`], [`operator`], [`model`], and [`hand`] for the hand.
 //!
 //! Results depend on the seed alone: not on the number of threads, nor on which vector instructions the machine has.
 

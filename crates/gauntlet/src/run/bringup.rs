@@ -25,7 +25,7 @@ const ANSWER_WAIT: Duration = Duration::from_secs(2);
 const ACTIVATION_WAIT: Duration = Duration::from_secs(20);
 
 impl Run {
-    /// Takes the hand as flat once it has been still for a second, within [`WAIT`]. Returns whether to go on: not when
+    /// Takes the hand as flat once it has been still for a second, within 30 s. Returns whether to go on: not when
     /// somebody asked for the end.
     ///
     /// # Errors

@@ -135,7 +135,7 @@ impl Hub {
         now.map_or_else(Progress::default, |now| said.numbers.progress(now))
     }
 
-    /// What happened since `seen` events had; `seen` is how many have now. What is older than the newest [`EVENTS`] is gone.
+    /// What happened since `seen` events had; `seen` is how many have now. What is older than the newest 32 is gone.
     pub fn happened(&self, seen: &mut u64) -> Vec<Happened> {
         let said = self.lock();
         let fresh = said.happened.saturating_sub(*seen);
