@@ -137,6 +137,13 @@ pub(crate) fn since(later: Instant, earlier: Instant) -> Duration {
     Duration::from_ticks(later.as_ticks().saturating_sub(earlier.as_ticks()))
 }
 
+/// Whether `stamp` lies at most `span` before `now`. One in the future is a fault of a clock: it does not.
+#[must_use]
+pub fn is_within(now: Instant, stamp: Instant, span: Duration) -> bool {
+    now.checked_duration_since(stamp)
+        .is_some_and(|age| age <= span)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -156,6 +163,15 @@ mod tests {
             timeout + last_byte(115_200, 21),
             Duration::from_micros(28_178)
         );
+    }
+
+    #[test]
+    fn a_stamp_from_the_future_is_within_no_span() {
+        let at = Instant::from_ticks;
+        assert!(is_within(at(9), at(9), Duration::from_ticks(0)));
+        assert!(is_within(at(9), at(3), Duration::from_ticks(6)));
+        assert!(!is_within(at(9), at(2), Duration::from_ticks(6)));
+        assert!(!is_within(at(9), at(10), MEMORY));
     }
 
     #[test]

@@ -101,6 +101,23 @@ fn a_fresh_motion_goes_out_as_one_read_write_and_a_stale_one_does_not() {
 }
 
 #[test]
+fn a_motion_stamped_in_the_future_does_not_go_out() {
+    let (line, mut gripper) = gripper();
+    let mut slave = Slave::three_finger();
+    for _ in 0..20 {
+        gripper.set_motion(Some(HALF), at(line.now() + 60_000));
+        let status = run_gripper(
+            &line,
+            &mut gripper,
+            line.now() + 50_000,
+            &mut |line, end, request| slave.serve(line, end, request),
+        );
+        status.unwrap().unwrap();
+    }
+    assert_eq!(slave.writes, 0);
+}
+
+#[test]
 fn a_gripper_that_is_not_ready_or_in_a_major_fault_is_never_written_to() {
     // Not active, activating, changing mode, active but reset; ready, with a fault that holds it.
     let not_ready = [0x00, 0x11, 0x21, 0x01].map(|first| (first, 0));

@@ -312,7 +312,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
     fn wanted(&self, now: Instant) -> Doing<X> {
         let read = Doing::read((function::READ_HOLDING, F::REGISTERS));
         let known = |before: &Snapshot<X>| {
-            !self.verify && timing::since(now, before.status.stamp) <= self.fresh()
+            !self.verify && timing::is_within(now, before.status.stamp, self.fresh())
         };
         let Some(before) = self.snapshot.filter(known) else {
             return read;
@@ -329,7 +329,7 @@ impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> 
             Some(Stage::Inspect | Stage::Watch) => read,
             None => match self.motion {
                 Some((motion, stamp))
-                    if may_move(&before) && timing::since(now, stamp) <= timing::STALE_MOTION =>
+                    if may_move(&before) && timing::is_within(now, stamp, timing::STALE_MOTION) =>
                 {
                     write(self.family.motion(&motion, &before), Some(motion))
                 }
