@@ -35,6 +35,8 @@ pub struct Telemetry<const X: usize> {
     /// Segments whose samples look good and are not used until the next calibration: they jumped or restarted (bit k: segment
     /// k).
     pub distrusted: u16,
+    /// Segments whose samples look good and are not used as long as they show what no hand does (bit k: segment k).
+    pub impossible: u16,
     /// Joints that repeat their last good angle (bit j: joint j).
     pub held_joints: u32,
     /// The map's output for `angles`, counts as they come from the map; `None` without map or when it refused.
@@ -125,6 +127,7 @@ impl<const X: usize> Telemetry<X> {
             angles_valid: false,
             missing: 0,
             distrusted: 0,
+            impossible: 0,
             held_joints: 0,
             map_output: None,
             target: None,

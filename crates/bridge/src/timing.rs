@@ -2,6 +2,8 @@
 
 use crate::{Duration, Instant};
 
+pub use gripper::timing::is_within;
+
 /// Period of the supervisor: one step at least this often.
 ///
 /// A gripper cycle (FC23 at 115200 baud) takes 7.8 ms, so a step has a new status nearly every time.
@@ -58,10 +60,4 @@ pub const SILENT: Duration = Duration::from_ticks(500_000);
 /// Whether what is stamped `stamp` may still be used: at most [`MAX_AGE`] old.
 pub fn is_fresh(now: Instant, stamp: Instant) -> bool {
     is_within(now, stamp, MAX_AGE)
-}
-
-/// Whether `stamp` lies at most `span` before `now`. One in the future is a fault of a clock: it does not.
-pub fn is_within(now: Instant, stamp: Instant, span: Duration) -> bool {
-    now.checked_duration_since(stamp)
-        .is_some_and(|age| age <= span)
 }

@@ -10,7 +10,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use rustix::process::{Pid, Signal, kill_process_group};
-use support::bench::{BRINGUP, Bench, Running, SOON, ends_soon, send};
+use support::bench::{BRINGUP, Bench, Running, SOON, ends_soon, send, state};
 use support::terminal::Terminal;
 use support::{Simulation, command, interrupt, poses_file, poses_text, refusal};
 
@@ -117,13 +117,6 @@ fn ctrl_z_holds_before_it_stops_and_the_clutch_is_open_afterwards() {
         interrupt(child);
     });
     assert_eq!(code, Some(0));
-}
-
-/// As the system tells it: `T` is stopped.
-fn state(child: &Child) -> char {
-    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
-    let (_, after) = stat.rsplit_once(") ").unwrap();
-    after.chars().next().unwrap()
 }
 
 #[test]

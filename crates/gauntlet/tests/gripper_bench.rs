@@ -9,6 +9,8 @@ use std::process::Child;
 use std::time::{Duration, Instant};
 
 use rig::gripper::{Config, Family, VirtualGripper, tcp};
+use rustix::process::Signal;
+use support::bench::{SOON, send, state};
 use support::devices::gripper;
 use support::{finish, interrupt, json, refusal, run, start, text};
 
@@ -210,6 +212,28 @@ fn ctrl_c_during_a_move_holds_the_gripper_where_it_is() {
             "the scissor did not move"
         );
     }
+}
+
+#[test]
+fn ctrl_z_during_a_move_holds_before_it_stops_and_the_move_is_over() {
+    let (gripper, handle, child) = moving(&["--to", "250"]);
+    send(&child, Signal::TSTP);
+    let end = Instant::now() + SOON;
+    while state(&child) != 'T' {
+        assert!(Instant::now() < end, "it did not stop");
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let rest = at_rest(&gripper, &handle);
+    assert!(rest[0] < 200.0, "{rest:?}");
+    let told = f32::from(gripper.command_block()[3]);
+    assert!((told - rest[0]).abs() <= 2.0, "{told} {rest:?}");
+    send(&child, Signal::CONT);
+    let error = refusal(&finish(child), 1);
+    assert!(
+        error.contains("Ctrl-Z") && error.contains("is held where it is"),
+        "{error}"
+    );
+    assert_eq!(at_rest(&gripper, &handle), rest, "it went on");
 }
 
 #[test]

@@ -56,3 +56,15 @@ fn every_option_of_every_verb_is_on_the_page_and_every_option_on_the_page_is_one
         );
     }
 }
+
+/// The terminal breaks lines; a break by hand within a sentence would make two.
+#[test]
+fn no_help_breaks_a_sentence_by_hand() {
+    for verb in gauntlet::cli::Cli::command().get_subcommands() {
+        let help = verb.get_after_help().map(ToString::to_string);
+        for line in help.unwrap_or_default().lines() {
+            let whole = line.is_empty() || line.starts_with(' ') || line.ends_with(['.', ':']);
+            assert!(whole, "{}: {line}", verb.get_name());
+        }
+    }
+}

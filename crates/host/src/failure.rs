@@ -18,6 +18,8 @@ pub struct Failure {
     what: String,
     next: String,
     exit: u8,
+    /// What else went wrong.
+    others: Vec<String>,
 }
 
 impl Failure {
@@ -27,6 +29,7 @@ impl Failure {
             what: what.into(),
             next: next.into(),
             exit: EXIT_FAILED,
+            others: Vec::new(),
         }
     }
 
@@ -89,6 +92,20 @@ pub fn told(error: impl fmt::Display) -> anyhow::Error {
     }
 }
 
+/// `first`, and what went wrong besides, which is told after it.
+pub fn with_others(first: anyhow::Error, others: Vec<String>) -> anyhow::Error {
+    if others.is_empty() {
+        return first;
+    }
+    match first.downcast::<Failure>() {
+        Ok(failure) => Failure { others, ..failure }.into(),
+        Err(first) => {
+            let failure = Failure::new(format!("{first:#}"), "");
+            Failure { others, ..failure }.into()
+        }
+    }
+}
+
 /// The lines for standard error, and the exit code.
 pub fn report(error: &anyhow::Error) -> (String, u8) {
     let failure = error.downcast_ref::<Failure>();
@@ -96,6 +113,10 @@ pub fn report(error: &anyhow::Error) -> (String, u8) {
     if let Some(failure) = failure.filter(|failure| !failure.next.is_empty()) {
         text.push_str("\n  try: ");
         text.push_str(&one_line(&failure.next));
+    }
+    for other in failure.iter().flat_map(|failure| &failure.others) {
+        text.push_str("\nalso: ");
+        text.push_str(&one_line(other));
     }
     (text, failure.map_or(EXIT_FAILED, Failure::exit_code))
 }
@@ -117,6 +138,24 @@ mod tests {
             text,
             "error: the file a.csv: row 3 is empty\n  try: look at row 3"
         );
+        assert_eq!(code, EXIT_FAILED);
+    }
+
+    #[test]
+    fn what_else_went_wrong_is_told_after_the_first_failure_and_its_next_step() {
+        let others = vec!["the log is incomplete".to_owned()];
+        let told = |first| report(&with_others(first, others.clone()));
+        let first = Failure::usage("the hold was not confirmed", "look at it");
+        assert_eq!(
+            told(first.into()),
+            (
+                "error: the hold was not confirmed\n  try: look at it\nalso: the log is incomplete"
+                    .to_owned(),
+                EXIT_USAGE
+            )
+        );
+        let (text, code) = told(anyhow::anyhow!("plain").context("more"));
+        assert_eq!(text, "error: more: plain\nalso: the log is incomplete");
         assert_eq!(code, EXIT_FAILED);
     }
 

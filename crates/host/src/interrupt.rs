@@ -6,6 +6,8 @@
 //! ends it at once (`interrupt::faults`).
 
 #[cfg(target_os = "linux")]
+mod background;
+#[cfg(target_os = "linux")]
 mod faults;
 
 use std::ffi::c_int;
@@ -127,14 +129,22 @@ impl Interrupt {
         self.flags.file_limit.swap(false, Ordering::Relaxed)
     }
 
-    /// Catches Ctrl-Z (SIGTSTP) for as long as what is returned lives.
+    /// Catches Ctrl-Z (SIGTSTP) for as long as what is returned lives: something is driven meanwhile. So long, too, what is printed
+    /// from the background stops nobody (SIGTTOU, after `stty tostop`).
     ///
     /// # Errors
     /// The system's error where the handler cannot be installed.
     pub fn catch_suspend(&self) -> std::io::Result<Suspend> {
         let asked = Arc::clone(&self.flags.suspend);
         let id = flag::register(SIGTSTP, Arc::clone(&asked))?;
-        Ok(Suspend { asked, id })
+        #[cfg(target_os = "linux")]
+        let background = background::Output::ignore_stop()?;
+        Ok(Suspend {
+            asked,
+            id,
+            #[cfg(target_os = "linux")]
+            _background: background,
+        })
     }
 
     /// Sleeps for `time`, or until the end is asked for. Returns whether it was.
@@ -170,6 +180,8 @@ impl AsFd for Interrupt {
 pub struct Suspend {
     asked: Arc<AtomicBool>,
     id: signal_hook::SigId,
+    #[cfg(target_os = "linux")]
+    _background: background::Output,
 }
 
 impl Suspend {
@@ -220,5 +232,15 @@ mod tests {
     fn sleep_without_a_request_ends_by_its_time() {
         let interrupt = Interrupt::never().unwrap();
         assert!(!interrupt.sleep(Duration::from_millis(3)));
+    }
+
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn output_from_the_background_stops_nobody_while_something_is_driven() {
+        let before = ignored(libc::SIGTTOU);
+        let suspend = Interrupt::never().unwrap().catch_suspend().unwrap();
+        assert!(ignored(libc::SIGTTOU));
+        drop(suspend);
+        assert_eq!(ignored(libc::SIGTTOU), before);
     }
 }

@@ -98,18 +98,34 @@ pub fn lost_sensors(health: &[Health; hand::SEGMENT_COUNT]) -> Option<String> {
 
 /// The sensors that are not used although they give orientations, by name. `distrusted`: bit k is segment k.
 pub fn distrusted_sensors(distrusted: u16) -> Option<String> {
-    let names: Vec<&str> = hand::SEGMENT_NAMES
-        .iter()
-        .enumerate()
-        .filter(|(segment, _)| distrusted >> segment & 1 == 1)
-        .map(|(_, name)| *name)
-        .collect();
+    let names = names_of(distrusted);
     (!names.is_empty()).then(|| {
         format!(
             "sensor {} jumped or restarted: its joints are held until the next calibration",
             names.join(", ")
         )
     })
+}
+
+/// The sensors that show what no hand does, by name. `impossible`: bit k is segment k.
+pub fn impossible_sensors(impossible: u16) -> Option<String> {
+    let names = names_of(impossible);
+    (!names.is_empty()).then(|| {
+        format!(
+            "sensor {} shows a joint turned farther than a hand's can be: its joints are held as long as it does",
+            names.join(", ")
+        )
+    })
+}
+
+/// The segments of a mask, by name.
+fn names_of(segments: u16) -> Vec<&'static str> {
+    hand::SEGMENT_NAMES
+        .iter()
+        .enumerate()
+        .filter(|(segment, _)| segments >> segment & 1 == 1)
+        .map(|(_, name)| *name)
+        .collect()
 }
 
 #[cfg(test)]
@@ -124,6 +140,13 @@ mod tests {
         good[4] = true;
         good[0] = false;
         assert_eq!(fingers_good(&good), [false; 5]);
+    }
+
+    #[test]
+    fn a_sensor_that_shows_what_no_hand_does_is_named() {
+        assert_eq!(impossible_sensors(0), None);
+        let text = impossible_sensors(1 << 4 | 1 << 11).unwrap();
+        assert!(text.starts_with("sensor index_proximal, ring_middle shows"));
     }
 
     #[test]

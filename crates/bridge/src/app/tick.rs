@@ -223,6 +223,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         self.telemetry.target = output.target;
         self.telemetry.glove_state = self.scanner.state();
         self.telemetry.distrusted = self.posture.distrusted();
+        self.telemetry.impossible = self.posture.impossible();
         let counters = &mut self.telemetry.counters;
         counters.glove = *self.scanner.counters();
         counters.gripper = self.gripper.counters();

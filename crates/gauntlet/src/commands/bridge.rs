@@ -293,10 +293,15 @@ fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interr
     });
     let rows = poses.finish()?;
     let (finished, driven) = driven?;
-    tell.say(format_args!(
-        "log        {} with {rows} poses",
-        path.display()
-    ));
+    match rows {
+        0 => tell.say(format_args!(
+            "log        none: no pose came, so that no file was left"
+        )),
+        rows => tell.say(format_args!(
+            "log        {} with {rows} poses",
+            path.display()
+        )),
+    }
     finish(at, &tell, finished, driven)
 }
 

@@ -24,9 +24,9 @@ Examples:
   gauntlet doctor --gripper /dev/ttyUSB1 --unit 12 --baud 57600 --gripper-model 2f85
   gauntlet doctor --gripper tcp:192.168.1.11 --json
 
-Nothing moves: a gripper is only read. A glove's sensors are brought up. A gripper that does not answer
-is looked for at other speeds and under every unit number, which takes up to half a minute (Ctrl-C ends it).
-It ends by itself whatever a line says, one that never falls silent too.
+Nothing moves: a gripper is only read. A glove's sensors are brought up. A gripper that does not answer \
+is looked for at other speeds and under every unit number, which takes up to half a minute (Ctrl-C ends it). \
+It ends by itself whatever a line says, one that never falls silent too. \
 Exit code 1 when something is wrong.")]
 pub struct Doctor {
     /// The gripper's serial port, or `tcp:HOST[:PORT]`.

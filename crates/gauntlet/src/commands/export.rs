@@ -22,7 +22,7 @@ Examples:
   gauntlet export model.safetensors --out weights.hae --int16 my_hand.csv --json
 
 The image has the normalisation folded in: raw radians in, counts out (docs/weights-image.md).
---int16 sets the ranges of the integers by the poses, best the ones the model was trained on, and
+--int16 sets the ranges of the integers by the poses, best the ones the model was trained on, and \
 stores the largest error over them in the image.")]
 pub struct Export {
     /// The trained model.

@@ -2,8 +2,8 @@
 
 use anyhow::Result;
 
-use crate::note;
 use crate::tell::Tell;
+use host::failure::with_others;
 use host::recording::Written;
 use host::session::{Ending, Stopped, Summary};
 
@@ -63,7 +63,7 @@ impl Finished {
 }
 
 /// Of what went wrong at the end of a run the first in this order: whether the gripper may still move, what ended the run,
-/// the rest. The others are noted.
+/// the rest. The others are told after it.
 ///
 /// # Errors
 /// That one.
@@ -82,8 +82,8 @@ fn first_failure<T>(
         .filter_map(Result::err);
     match (failures.next(), value) {
         (Some(first), _) => {
-            failures.for_each(|other| note!("also: {other:#}"));
-            Err(first)
+            let others = failures.map(|other| format!("{other:#}")).collect();
+            Err(with_others(first, others))
         }
         (None, Some(value)) => Ok(value),
         // An error of `driven` is among the failures.

@@ -179,6 +179,8 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
         Kind::AxisStands { .. } => true,
         Kind::SensorRestarted { segment } => snapshot.distrusted >> segment & 1 == 0,
         Kind::Sensors(Finding::Jumped { segment, .. }) => snapshot.distrusted >> segment & 1 == 0,
+        // As long as it is so, `standing` says it.
+        Kind::Sensors(Finding::Impossible { .. }) => true,
         Kind::Sensors(Finding::Frozen { segment }) => is_good(snapshot, (*segment).into()),
         Kind::Sensors(Finding::AllFrozen) => (0..SEGMENT_COUNT).any(|k| is_good(snapshot, k)),
         Kind::Calibration(end) => snapshot.calibration.newest != *end,
@@ -249,7 +251,8 @@ fn standing(snapshot: &Snapshot) -> Vec<String> {
 /// The fingers of the hand.
 pub(super) fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
     let good: [bool; SEGMENT_COUNT] = core::array::from_fn(|segment| {
-        is_good(snapshot, segment) && snapshot.distrusted >> segment & 1 == 0
+        let unused = snapshot.distrusted | snapshot.impossible;
+        is_good(snapshot, segment) && unused >> segment & 1 == 0
     });
     let good = words::fingers_good(&good);
     words::FINGER_NAMES

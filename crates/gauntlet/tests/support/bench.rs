@@ -223,3 +223,18 @@ pub fn jumps(glove: &VirtualGlove, sensor: usize) {
         std::thread::sleep(Duration::from_millis(500));
     }
 }
+
+/// A sensor turns slowly, as a hand could, to where no hand can be.
+pub fn creeps(glove: &VirtualGlove, sensor: usize) {
+    for degree in 1..=120 {
+        glove.set_heading(sensor, (degree as f32).to_radians());
+        std::thread::sleep(Duration::from_millis(30));
+    }
+}
+
+/// As the system tells it: `T` is stopped.
+pub fn state(child: &Child) -> char {
+    let stat = std::fs::read_to_string(format!("/proc/{}/stat", child.id())).unwrap();
+    let (_, after) = stat.rsplit_once(") ").unwrap();
+    after.chars().next().unwrap()
+}

@@ -3,18 +3,17 @@
 use std::time::{Duration, Instant};
 
 use bridge::State;
+use bridge::protocol::message::Refusal;
 use gripper::Activation;
 
-use super::stopped::{HOLD_WAIT, Stopped};
+use super::on_chip::SAMPLE_MS;
+use super::stopped::{HOLD_WAIT, Standing, Stopped};
 use crate::chip::link::{Error, HostLink};
 
 /// Between two looks.
 const PAUSE: Duration = Duration::from_millis(30);
 /// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.
 const STATUSES: u32 = 3;
-
-/// Statuses over which a gripper that is told nothing must not have moved: half a second.
-const STANDS: u32 = 60;
 
 /// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on.
 pub(super) fn stop(link: &mut HostLink) -> Stopped {
@@ -24,9 +23,30 @@ pub(super) fn stop(link: &mut HostLink) -> Stopped {
     }
 }
 
+/// Asks; where this program stood still for so long that the bridge ended its session, in a new one.
+fn ask<T>(
+    link: &mut HostLink,
+    call: impl Fn(&mut HostLink) -> Result<T, Error>,
+) -> Result<T, Error> {
+    match call(link) {
+        Err(Error::Refused(Refusal::NoSession)) => {
+            renew(link)?;
+            call(link)
+        }
+        answer => answer,
+    }
+}
+
+/// Begins a session anew, with telemetry.
+pub(super) fn renew(link: &mut HostLink) -> Result<(), Error> {
+    link.renew()?;
+    link.telemetry(SAMPLE_MS)
+}
+
 fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
+    // Obeyed without a session, too.
     let released_us = link.release()?.now_us;
-    let at_release = link.counters()?;
+    let at_release = ask(link, HostLink::counters)?;
     if at_release.commands == 0 {
         let gripper = link.status()?.gripper;
         return Ok(match gripper.map(|gripper| gripper.activation) {
@@ -36,7 +56,7 @@ fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
     }
     let end = Instant::now() + Duration::from_micros(HOLD_WAIT.as_micros());
     let mut command = None;
-    let mut stood = None;
+    let mut standing = Standing::default();
     loop {
         for sample in link.listen(PAUSE)? {
             // What the gripper is told now that the clutch is open.
@@ -53,15 +73,9 @@ fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
             if command.as_ref() == Some(&gripper.echo) {
                 return Ok(Stopped::Held);
             }
-            // Told nothing: it goes nowhere by itself, or it opens by itself, which only its positions tell.
-            let (since, position) =
-                stood.get_or_insert((counters.statuses, gripper.position.clone()));
-            if *position != gripper.position {
-                stood = None;
-            } else if counters.statuses.wrapping_sub(*since) >= STANDS
-                && command.as_ref().is_some_and(|command| command.is_empty())
-            {
-                return Ok(Stopped::Held);
+            let told_nothing = command.as_ref().is_some_and(|command| command.is_empty());
+            if standing.look(counters.statuses, &gripper.position) && told_nothing {
+                return Ok(Stopped::NothingWritten);
             }
         }
         if Instant::now() >= end {

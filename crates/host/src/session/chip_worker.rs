@@ -8,10 +8,11 @@ use bridge::HoldReason;
 use bridge::calibration::{CalibrationState, Refusal, Try};
 use bridge::clutch::{HeartbeatRefusal, Position};
 use bridge::event::Kind;
+use bridge::protocol;
 use bridge::protocol::message::{Counters, Sample, Status};
 
 use super::axes::Axes;
-use super::chip_stop::stop;
+use super::chip_stop::{renew, stop};
 use super::hub::{Happened, Hub, Totals};
 use super::orders::{Order, Queue};
 use super::record::Sort;
@@ -110,7 +111,10 @@ impl Worker {
             match self.round() {
                 Ok(true) => {}
                 Ok(false) => break None,
-                Err(error) => break Some(error),
+                Err(error) => match self.go_on_after(error) {
+                    Ok(()) => {}
+                    Err(error) => break Some(error),
+                },
             }
         };
         let stopped = match self.touched {
@@ -124,6 +128,24 @@ impl Worker {
         // Nobody listens any more, whether the bridge hears it or not.
         let _ = self.link.telemetry(0);
         Left { stopped, fault }
+    }
+
+    /// Where this program stood still for so long that the bridge ended its session: a new one. The clutch has opened by itself.
+    fn go_on_after(&mut self, error: Error) -> Result<(), Error> {
+        if error != Error::Refused(protocol::message::Refusal::NoSession) {
+            return Err(error);
+        }
+        renew(&mut self.link)?;
+        let status = self.link.status()?;
+        if status.now_us < self.status.now_us {
+            // The bridge started anew meanwhile, and knows nothing of what was.
+            return Err(error);
+        }
+        self.status = status;
+        if self.epoch.take().is_some() {
+            self.clutch = Position::Expired;
+        }
+        Ok(())
     }
 
     /// Returns whether to go on.
@@ -315,6 +337,7 @@ impl Worker {
             angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),
             angles_valid: status.glove_answers && !self.useless,
             distrusted: 0,
+            impossible: 0,
             command: newest.and_then(|sample| Axes::new(&sample.command)),
             sent: None,
             gripper_answers: gripper.is_some(),

@@ -104,6 +104,8 @@ pub struct Snapshot {
     pub angles_valid: bool,
     /// Segments that are not used until the next calibration (bit k: segment k).
     pub distrusted: u16,
+    /// Segments whose joint is turned farther than a hand's can be, as long as it is (bit k: segment k).
+    pub impossible: u16,
     /// What the gripper is told now, counts; `None`: it is only read.
     pub command: Option<Axes<u8>>,
     /// Whether the newest command that left follows the hand, and when it was decided; `None` before the first.
@@ -143,6 +145,7 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
             angles: now.angles,
             angles_valid: now.angles_valid,
             distrusted: now.distrusted,
+            impossible: now.impossible,
             command: now.command.map(|motion| motion.position.into()),
             sent: now.sent.map(|sent| Sent {
                 follows: sent.follows,
@@ -167,6 +170,7 @@ impl Snapshot {
             unused.extend(words::lost_sensors(&health));
         }
         unused.extend(words::distrusted_sensors(self.distrusted));
+        unused.extend(words::impossible_sensors(self.impossible));
         unused
     }
 
@@ -180,7 +184,7 @@ impl Snapshot {
         }
         let unused = self.unused_sensors();
         if unused.is_empty() {
-            return "their joint angles are no numbers".to_owned();
+            return "they give no joint angles".to_owned();
         }
         unused.join("; ")
     }

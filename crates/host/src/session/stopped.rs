@@ -22,8 +22,41 @@ pub enum Stopped {
     Activating,
     /// It was commanded before, and did not confirm the hold.
     NotConfirmed,
+    /// Nothing is written to it: it is not ready, or what it says cannot be believed. It answers, and what it says of its
+    /// positions stays the same.
+    NothingWritten,
     /// The bridge on the chip was not heard any more, so nobody saw what became of the hold.
     Unheard,
+    /// The bridge on the chip restarted since the clutch was closed: it knows of no hold.
+    Restarted,
+}
+
+/// Statuses over which a gripper that is told nothing must not have moved: half a second.
+const STANDS: u32 = 60;
+
+/// Whether a gripper to which nothing is written says that it stays where it is: it may go on to where it was told last, or
+/// open by itself, which only its positions tell.
+#[derive(Debug, Default)]
+pub struct Standing {
+    since: Option<(u32, Vec<u8>)>,
+}
+
+impl Standing {
+    /// Takes the positions of one status; `statuses` counts them. True once they were the same in all of [`STANDS`].
+    pub fn look(&mut self, statuses: u32, position: &[u8]) -> bool {
+        match &self.since {
+            Some((since, known)) if known == position => statuses.wrapping_sub(*since) >= STANDS,
+            _ => {
+                self.since = Some((statuses, position.to_vec()));
+                false
+            }
+        }
+    }
+
+    /// Something is written again.
+    pub fn forget(&mut self) {
+        self.since = None;
+    }
 }
 
 impl Stopped {
@@ -40,15 +73,28 @@ impl Stopped {
                 "waiting for its end; in danger switch off the gripper's 24 V supply",
             )
             .into()),
+            Self::NothingWritten => Err(Failure::new(
+                "the gripper was not held: nothing is written to it, since it is not ready or what it says cannot be believed; \
+                 the positions it says stayed the same for half a second",
+                "look at the gripper: an axis comes to rest at most 40 counts from where it was believed to be last; \
+                 in danger switch off its 24 V supply; `gauntlet gripper status --gripper PORT` with its port",
+            )
+            .into()),
             Self::Unheard => Err(Failure::new(
-                "the line to the bridge broke while the clutch was closed: the bridge holds the gripper by itself 250 ms after \
+                "the bridge was heard no more while the clutch was closed: it holds the gripper by itself 250 ms after \
                  the last heartbeat, but nobody saw it",
                 "looking at the gripper; `gauntlet bridge status` says what the bridge does",
             )
             .into()),
+            Self::Restarted => Err(Failure::new(
+                "the bridge restarted while the clutch was closed: the hold was not confirmed",
+                "look at the gripper: an axis comes to rest at most 40 counts from where it was; \
+                 `gauntlet bridge status` says why the bridge started",
+            )
+            .into()),
             Self::NotConfirmed => Err(Failure::new(
                 format!(
-                    "the hold was not confirmed: the gripper gave no right answer in {:.1} s",
+                    "the hold was not confirmed: in {:.1} s no answer of the gripper repeated it",
                     HOLD_WAIT.as_micros() as f64 / 1e6
                 ),
                 "look at the gripper: an axis comes to rest at most 40 counts from where it was; \
@@ -56,5 +102,38 @@ impl Stopped {
             )
             .into()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_gripper_that_is_told_nothing_stands_once_its_positions_stayed_for_half_a_second() {
+        let mut standing = Standing::default();
+        assert!(!standing.look(u32::MAX - 9, &[7, 8]));
+        assert!(!standing.look(STANDS - 11, &[7, 8]));
+        assert!(standing.look(STANDS - 10, &[7, 8]));
+        assert!(!standing.look(STANDS, &[7, 9]), "it moved");
+        assert!(!standing.look(2 * STANDS - 1, &[7, 9]));
+        assert!(standing.look(2 * STANDS, &[7, 9]));
+        standing.forget();
+        assert!(!standing.look(3 * STANDS, &[7, 9]));
+    }
+
+    #[test]
+    fn only_a_hold_that_was_confirmed_is_told_as_one() {
+        for stopped in [
+            Stopped::NothingWritten,
+            Stopped::NotConfirmed,
+            Stopped::Unheard,
+            Stopped::Restarted,
+            Stopped::Activating,
+        ] {
+            let text = stopped.judge().unwrap_err().to_string();
+            assert!(!text.contains("is held"), "{text}");
+        }
+        assert!(Stopped::Held.judge().unwrap().contains("is held"));
     }
 }

@@ -12,7 +12,7 @@ use super::orders::{Order, Queue};
 use super::record::{Command, Feed, Frame, Imu, Record, Sort};
 use super::slots::MemorySlot;
 use super::snapshot::Snapshot;
-use super::stopped::{HOLD_WAIT, Stopped};
+use super::stopped::{HOLD_WAIT, Standing, Stopped};
 use crate::lines::port::Port;
 use crate::lines::{Line, Pc};
 use crate::realtime::Scheduling;
@@ -44,6 +44,8 @@ pub(super) struct Worker {
     /// When the hold was ordered.
     ending: Option<Instant>,
     activation_asked: bool,
+    /// Of a gripper that is told nothing.
+    standing: Standing,
 }
 
 /// The sequence numbers already handed over.
@@ -67,6 +69,7 @@ impl Worker {
             seen: Seen::default(),
             ending: None,
             activation_asked: false,
+            standing: Standing::default(),
         }
     }
 
@@ -123,7 +126,7 @@ impl Worker {
     }
 
     /// How the gripper is left: as soon as that is sure, or the wait for it is over.
-    fn ended<const X: usize>(&self, telemetry: &Telemetry<X>) -> Option<Stopped> {
+    fn ended<const X: usize>(&mut self, telemetry: &Telemetry<X>) -> Option<Stopped> {
         let since = self.ending?;
         let ready = telemetry
             .status
@@ -136,6 +139,14 @@ impl Worker {
         }
         if hold_confirmed(telemetry.sent.as_ref(), telemetry.status.as_ref(), since) {
             return Some(Stopped::Held);
+        }
+        if let Some(status) = &telemetry.status {
+            let stands = self
+                .standing
+                .look(telemetry.status_sequence, &status.position);
+            if telemetry.command.is_none() && stands {
+                return Some(Stopped::NothingWritten);
+            }
         }
         let waited = telemetry.now.checked_duration_since(since);
         waited

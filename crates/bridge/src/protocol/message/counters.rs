@@ -2,20 +2,24 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Counts since start.
+/// Counts since start. On the wire they have no names; in JSON they have those of every summary.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counters {
     /// Frames taken from the glove.
+    #[serde(rename = "glove_frames")]
     pub frames: u32,
     /// Frames that the gripper was to follow.
+    #[serde(rename = "frames_following")]
     pub following_frames: u32,
     /// Of those, frames of which a command left.
+    #[serde(rename = "frames_answered")]
     pub answered_frames: u32,
     /// Frames that gave no angles or were refused by the map.
     pub unusable_frames: u32,
     /// Commands that left.
     pub commands: u32,
     /// Statuses of the gripper.
+    #[serde(rename = "gripper_cycles")]
     pub statuses: u32,
     /// Cycles of the gripper that ended in an error.
     pub gripper_errors: u32,

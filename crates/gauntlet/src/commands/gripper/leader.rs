@@ -51,6 +51,8 @@ pub(super) enum End<const X: usize> {
     Doubted(Failure),
     /// The process stood still for so long.
     Stood(gripper::Duration),
+    /// Somebody asked for a pause (Ctrl-Z).
+    Suspended,
     /// No status came for [`SILENCE`].
     Silent,
 }
@@ -233,7 +235,7 @@ impl<'a, const X: usize> Leader<'a, X> {
         self.told.is_some()
     }
 
-    fn has_written<B: Bench<X>>(&self, driver: &B) -> bool {
+    pub(super) fn has_written<B: Bench<X>>(&self, driver: &B) -> bool {
         driver.counters().writes != self.written
     }
 
@@ -316,7 +318,7 @@ impl<'a, const X: usize> Leader<'a, X> {
 
     /// Whether a motion may rest on it: one is no older than that itself.
     fn is_fresh(&self, now: Instant, status: &Status<X>) -> bool {
-        since(now, status.stamp) <= timing::STALE_MOTION + self.patience
+        timing::is_within(now, status.stamp, timing::STALE_MOTION + self.patience)
     }
 
     /// Whether the newest status is one to hold on.

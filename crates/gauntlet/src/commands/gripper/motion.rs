@@ -16,7 +16,9 @@ use super::bench::Bench;
 use super::leader::{End, LEAD, Leader, SILENCE};
 use super::refusal::may_move;
 use super::{Doing, Move};
-use host::failure::Failure;
+use crate::note;
+use host::failure::{Failure, OrFail};
+use host::interrupt::Suspend;
 
 /// The slowest full stroke takes 7 s; one that needs longer is stuck.
 const MOVE_WAIT: Duration = Duration::from_secs(15);
@@ -47,7 +49,11 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
     ));
     let mut leader = Leader::new(doing, options, axes, target, *status);
     let written = doing.driver.counters().writes;
-    let ended = approach(doing, &mut leader);
+    let suspend = doing.waiter.interrupt.catch_suspend().or_fail(
+        || "Ctrl-Z cannot be caught".to_owned(),
+        "ending other programs: the system lacks descriptors",
+    )?;
+    let ended = approach(doing, &mut leader, &suspend);
     doing.driver.set_motion(None, doing.waiter.clock.now());
     let written = doing.driver.counters().writes != written;
     Err(match ended {
@@ -66,6 +72,7 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
             let why = format!("the process stood still for {seconds:.1} s during the move");
             held(doing, &mut leader, &why, options.again())
         }
+        Some(End::Suspended) => suspended(doing, &mut leader, &suspend),
         Some(End::Silent) => unsure(
             "the gripper stopped answering during the move",
             doing.target,
@@ -73,6 +80,20 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
         None => given_up(doing, &mut leader, written),
     }
     .into())
+}
+
+/// Ctrl-Z in motion: holds, then stops the program. When it goes on, the move is over, as after a stall.
+fn suspended<B: Bench<X>, const X: usize>(
+    doing: &mut Doing<'_, B>,
+    leader: &mut Leader<X>,
+    suspend: &Suspend,
+) -> Failure {
+    let why = "the process was stopped (Ctrl-Z) during the move";
+    let failure = held(doing, leader, why, leader.options.again());
+    note!("{failure}");
+    // Where it does not stop it ends all the same.
+    let _ = suspend.stop();
+    failure
 }
 
 /// Holds, and says whether that was confirmed.
@@ -183,10 +204,19 @@ fn move_wait(target: &Target) -> Duration {
 fn approach<B: Bench<X>, const X: usize>(
     doing: &mut Doing<'_, B>,
     leader: &mut Leader<X>,
+    suspend: &Suspend,
 ) -> Option<End<X>> {
     let waiter = doing.waiter.clone();
     let time = move_wait(doing.target);
     waiter.pump(&mut doing.driver, time, |driver, now, heard| {
+        if suspend.asked() {
+            if leader.has_written(driver) {
+                return ControlFlow::Break(End::Suspended);
+            }
+            // Nothing moves yet: what was heard is looked at anew afterwards.
+            let _ = suspend.stop();
+            return ControlFlow::Continue(());
+        }
         match leader.step(driver, now, heard) {
             Some(end) => ControlFlow::Break(end),
             None => ControlFlow::Continue(()),

@@ -38,8 +38,8 @@ Examples:
   gauntlet reproduce all --quick --out look            (a few minutes: what the pictures look like, not their numbers)
   gauntlet reproduce all                               (all night: every number of the paper)
 
-Everything goes into the folder --out: tables as text and CSV, figures as SVG with their data as CSV, and in
-`trainings` each training with its model. A stopped run goes on where it was when the same command is given again.
+Everything goes into the folder --out: tables as text and CSV, figures as SVG with their data as CSV, and in \
+`trainings` each training with its model. A stopped run goes on where it was when the same command is given again. \
 Figures 7 and 8 show a hand's bones and the hardware; there is nothing to compute.")]
 pub struct Reproduce {
     /// Tables and figures.

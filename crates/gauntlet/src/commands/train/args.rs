@@ -24,9 +24,9 @@ Examples:
   gauntlet train --poses my_hand.csv --out model.safetensors --checkpoint half.checkpoint    (Ctrl-C stops it)
   gauntlet train --poses my_hand.csv --out model.safetensors --resume half.checkpoint
 
-Hands: CSV with a header, optional `time_s` first, then the 25 joint angles in radians (docs/tool.md lists
+Hands: CSV with a header, optional `time_s` first, then the 25 joint angles in radians (docs/tool.md lists \
 them). A script answers for the person who would show the hand pose that belongs to a gripper pose.
-Any two domains: samples of the input in the columns q0, q1, …, of the target in x0, x1, …, true pairs in
+Any two domains: samples of the input in the columns q0, q1, …, of the target in x0, x1, …, true pairs in \
 q0… and x0…; values are taken as they are. 60 % of the rows train, the rest measure the result."
 )]
 pub struct Train {

@@ -120,6 +120,15 @@ impl HostLink {
         }
     }
 
+    /// Begins the session anew on the same line: the bridge ended it, since it heard nothing for 2 s. Its telemetry is off then,
+    /// and no clutch is kept.
+    ///
+    /// # Errors
+    /// As [`HostLink::call`].
+    pub fn renew(&mut self) -> Result<(), Error> {
+        self.say_hello()
+    }
+
     /// Fails where the bridge speaks an older version, which lacks what is asked for.
     fn require_own_version(&self, what: &'static str) -> Result<(), Error> {
         match self.hello {
