@@ -42,7 +42,7 @@ pub struct Standing {
 }
 
 impl Standing {
-    /// Takes the positions of one status; `statuses` counts them. True once they were the same in all of [`STANDS`].
+    /// Takes the positions of one status; `statuses` counts them. True once they were the same in 60 in a row, half a second.
     pub fn look(&mut self, statuses: u32, position: &[u8]) -> bool {
         match &self.since {
             Some((since, known)) if known == position => statuses.wrapping_sub(*since) >= STANDS,
