@@ -8,9 +8,9 @@ use std::time::Instant;
 /// A newest step counts for no less than this share, so that the estimate follows a machine that is busy now, and steps that cost
 /// less as the map settles.
 const LEAST_SHARE: f64 = 1.0 / 50.0;
-/// What steps with attraction cost on the whole, over what a trial before the first of them does: as the map settles, fewer
-/// neighbours change (hand, fast schedule: 0.7 to 0.85 measured by `bench_train estimate`).
-const SETTLES: f64 = 0.8;
+/// What steps with attraction cost on the whole, over what they cost now, where the rate falls to nothing at the end: as the map
+/// settles, fewer neighbours change (hand, fast schedule, `bench_train estimate`: 0.76 to 0.87). With a rate that stays, no less.
+const SETTLES: f64 = 0.82;
 /// A trial is made so often in a training, for as long as there is no attraction.
 const TRIALS: usize = 16;
 /// Steps of a trial that count, after one with each batch: the first visit of a batch looks for every neighbour anew.
@@ -95,8 +95,12 @@ impl Clock {
             0
         };
         let without = total - trainer.epoch - with;
-        // What is measured before they come is one of the first, which cost the most.
-        let settles = if self.steps[1] == 0 { SETTLES } else { 1.0 };
+        let cooling = trainer.plan.cooling_epochs;
+        let settles = if cooling > 0 && with > cooling / 2 {
+            SETTLES
+        } else {
+            1.0
+        };
         let seconds = without as f64 * self.seconds[0] + settles * with as f64 * self.seconds[1];
         Duration::try_from_secs_f64(seconds).unwrap_or_default()
     }
