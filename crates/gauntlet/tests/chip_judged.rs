@@ -17,7 +17,10 @@ use support::{command, devices, model, refusal, run, text, until_line, wait};
 fn engaged(jammed: bool, breaks: impl FnOnce(&VirtualGlove)) -> Option<Output> {
     let firmware = find_firmware(None).ok().filter(|_| qemu_is_there());
     let Some(firmware) = firmware else {
-        println!("skipped: no QEMU, or no firmware (`cargo xtask firmware`)");
+        rig::skip::skipped(
+            rig::skip::Need::Chip,
+            "no QEMU, or no firmware (`cargo xtask firmware`)",
+        );
         return None;
     };
     let moves = Arc::new(AtomicBool::new(false));

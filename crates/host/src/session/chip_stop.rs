@@ -15,9 +15,10 @@ const PAUSE: Duration = Duration::from_millis(30);
 /// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.
 const STATUSES: u32 = 3;
 
-/// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on.
-pub(super) fn stop(link: &mut HostLink) -> Stopped {
-    match confirmed(link) {
+/// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on. `known_us`: the
+/// bridge's clock when it was last heard; one that reads less has started anew, and its counters know nothing of what it commanded.
+pub(super) fn stop(link: &mut HostLink, known_us: u64) -> Stopped {
+    match confirmed(link, known_us) {
         Ok(stopped) => stopped,
         Err(_) => Stopped::Unheard,
     }
@@ -43,9 +44,12 @@ pub(super) fn renew(link: &mut HostLink) -> Result<(), Error> {
     link.telemetry(SAMPLE_MS)
 }
 
-fn confirmed(link: &mut HostLink) -> Result<Stopped, Error> {
+fn confirmed(link: &mut HostLink, known_us: u64) -> Result<Stopped, Error> {
     // Obeyed without a session, too.
     let released_us = link.release()?.now_us;
+    if released_us < known_us {
+        return Ok(Stopped::Restarted);
+    }
     let at_release = ask(link, HostLink::counters)?;
     if at_release.commands == 0 {
         let gripper = link.status()?.gripper;

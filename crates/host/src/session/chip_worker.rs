@@ -118,7 +118,7 @@ impl Worker {
             }
         };
         let stopped = match self.touched {
-            true => stop(&mut self.link),
+            true => stop(&mut self.link, self.status.now_us),
             // Somebody else may drive it.
             false => Stopped::Untouched,
         };

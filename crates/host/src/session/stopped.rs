@@ -52,11 +52,6 @@ impl Standing {
             }
         }
     }
-
-    /// Something is written again.
-    pub fn forget(&mut self) {
-        self.since = None;
-    }
 }
 
 impl Stopped {
@@ -118,8 +113,6 @@ mod tests {
         assert!(!standing.look(STANDS, &[7, 9]), "it moved");
         assert!(!standing.look(2 * STANDS - 1, &[7, 9]));
         assert!(standing.look(2 * STANDS, &[7, 9]));
-        standing.forget();
-        assert!(!standing.look(3 * STANDS, &[7, 9]));
     }
 
     #[test]
