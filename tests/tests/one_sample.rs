@@ -1,12 +1,42 @@
-//! docs/one-sample.md names files and functions: they are there.
+//! docs/one-sample.md names files and functions: they are there, and the README's picture has the same names.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+fn workspace() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .parent()
+        .expect("the workspace")
+        .to_owned()
+}
+
+#[test]
+fn the_boxes_of_the_picture_are_the_modules_of_the_way() {
+    let page = std::fs::read_to_string(workspace().join("docs/one-sample.md")).expect("the page");
+    let picture = std::fs::read_to_string(workspace().join("docs/path.svg")).expect("the picture");
+    let titles: Vec<&str> = picture
+        .lines()
+        .filter(|line| line.contains("font-weight=\"bold\""))
+        .filter_map(|line| line.split('>').nth(1)?.split('<').next())
+        .collect();
+    let outside = ["Glove", "Gripper", "Host tool: gauntlet"];
+    let inside: Vec<&str> = titles
+        .into_iter()
+        .filter(|title| !outside.contains(title) && !title.starts_with("Bridge"))
+        .collect();
+    assert!(inside.len() >= 5, "{inside:?}");
+    for module in inside {
+        let module = module.to_lowercase();
+        assert!(
+            page.contains(&format!("/src/{module}/"))
+                || page.contains(&format!("/src/{module}.rs")),
+            "the picture's {module} is no module of docs/one-sample.md"
+        );
+    }
+}
 
 #[test]
 fn every_arrow_of_the_way_of_one_sample_names_a_file_and_a_function_that_are_there() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .parent()
-        .expect("the workspace");
+    let root = workspace();
     let page = std::fs::read_to_string(root.join("docs/one-sample.md")).expect("the page");
     let rows = page
         .lines()
