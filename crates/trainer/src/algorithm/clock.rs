@@ -12,9 +12,9 @@ const LEAST_SHARE: f64 = 1.0 / 50.0;
 /// settles, fewer neighbours change (hand, fast schedule, `bench_train estimate`: 0.76 to 0.87). With a rate that stays, no less.
 const SETTLES: f64 = 0.82;
 /// A trial is made so often in a training, for as long as there is no attraction.
-const TRIALS: usize = 16;
+const TRIALS: usize = 6;
 /// Steps of a trial that count, after one with each batch: the first visit of a batch looks for every neighbour anew.
-const COUNTED: usize = 7;
+const COUNTED: usize = 5;
 
 /// Estimates the time left, from the time of the steps so far, with and without attraction.
 pub(super) struct Clock {

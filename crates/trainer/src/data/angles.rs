@@ -30,11 +30,7 @@ pub(super) fn read(table: &mut Table, names: &[&str]) -> Result<Matrix, Error> {
             // As wide as a full turn in the file's own precision.
             if (written as f32).abs() > turn as f32 {
                 return Err(Error::BeyondTurn {
-                    file: table.file.clone(),
-                    line: table.rows[row].0,
-                    row: row + 1,
-                    column: names[column].to_owned(),
-                    value: written as f32,
+                    at: table.field(row, places[column]),
                     degrees,
                 });
             }

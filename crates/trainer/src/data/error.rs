@@ -2,6 +2,41 @@
 
 use std::path::PathBuf;
 
+/// A row of a file.
+#[derive(Clone, Debug)]
+pub struct Row {
+    /// The file.
+    pub file: PathBuf,
+    /// Line in the file, from 1.
+    pub line: u64,
+    /// Row, from 1.
+    pub row: usize,
+}
+
+impl core::fmt::Display for Row {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        let Self { file, line, row } = self;
+        write!(f, "{}, line {line} (row {row})", file.display())
+    }
+}
+
+/// A field of a file; displayed without its value.
+#[derive(Clone, Debug)]
+pub struct Field {
+    /// Its row.
+    pub row: Row,
+    /// Its column, as written.
+    pub column: String,
+    /// What stands there, as written.
+    pub value: String,
+}
+
+impl core::fmt::Display for Field {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        write!(f, "{}, column `{}`", self.row, self.column)
+    }
+}
+
 /// What can be wrong with a file of samples. Rows are counted from 1 without the header; the line of the file comes with them.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
@@ -61,36 +96,19 @@ pub enum Error {
     },
     /// Commas between the fields and within the numbers.
     #[error(
-        "{}, line {line} (row {row}): {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields; save it with semicolons between the fields, or with decimal points", file.display()
+        "{at}: {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields; save it with semicolons between the fields, or with decimal points"
     )]
     BothCommas {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
+        /// Where.
+        at: Row,
         /// Fields in this row.
         found: usize,
         /// Fields in the header.
         expected: usize,
     },
     /// A decimal point in a file with decimal commas.
-    #[error(
-        "{}, line {line} (row {row}), column `{column}`: `{value}` has a point, others have decimal commas; save the file with one of them, without marks between thousands", file.display()
-    )]
-    TwoMarks {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The field as written.
-        value: String,
-    },
+    #[error("{0}: `{value}` has a point, others have decimal commas; save the file with one of them, without marks between thousands", value = .0.value)]
+    TwoMarks(Field),
     /// No header line.
     #[error(
         "{} is empty; it needs a header line that names the columns, then one line a sample", file.display()
@@ -122,69 +140,29 @@ pub enum Error {
         column: String,
     },
     /// A row has more or fewer fields than the header.
-    #[error(
-        "{}, line {line} (row {row}): {found} fields, the header has {expected}; complete or remove this row", file.display()
-    )]
+    #[error("{at}: {found} fields, the header has {expected}; complete or remove this row")]
     Ragged {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
+        /// Where.
+        at: Row,
         /// Fields in this row.
         found: usize,
         /// Fields in the header.
         expected: usize,
     },
     /// A field is not a number.
-    #[error(
-        "{}, line {line} (row {row}), column `{column}`: `{value}` is not a number; write it like 0.25, or remove this row", file.display()
-    )]
-    NotNumeric {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The field as written.
-        value: String,
-    },
+    #[error("{0}: `{value}` is not a number; write it like 0.25, or remove this row", value = .0.value)]
+    NotNumeric(Field),
     /// A field is NaN, infinite, or too large for a 32-bit number.
-    #[error(
-        "{}, line {line} (row {row}), column `{column}`: {value} is not a finite value; remove this row or fill the gap", file.display()
-    )]
-    NotFinite {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The field as written.
-        value: String,
-    },
+    #[error("{0}: {value} is not a finite value; remove this row or fill the gap", value = .0.value)]
+    NotFinite(Field),
     /// An angle beyond a full turn.
     #[error(
-        "{}, line {line} (row {row}), column `{column}`: {value} is beyond {}", file.display(),
+        "{at}: {} is beyond {}", at.value,
         if *degrees { "±360°; repair or remove this row" } else { "±2π radians; take full turns away where a sensor counted on, or say in the header that angles are in degrees (`index_mcp_flex [deg]`)" }
     )]
     BeyondTurn {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The value as written.
-        value: f32,
+        /// Where, and the value.
+        at: Field,
         /// Whether the file is in degrees.
         degrees: bool,
     },
@@ -214,19 +192,11 @@ pub enum Error {
     },
     /// Times do not grow.
     #[error(
-        "{}, line {line} (row {row}), column `{column}`: {time_s} does not come after {before}; a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order", file.display()
+        "{at}: {} does not come after {before}; a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order", at.value
     )]
     TimeNotIncreasing {
-        /// The file.
-        file: PathBuf,
-        /// Line in the file, from 1.
-        line: u64,
-        /// Row, from 1.
-        row: usize,
-        /// The column.
-        column: String,
-        /// The time of this row, as written.
-        time_s: f64,
+        /// Where, and the time of this row.
+        at: Field,
         /// The time of the row before.
         before: f64,
     },

@@ -16,7 +16,7 @@ pub use csv_file::{
     write_poses, write_samples,
 };
 
-pub use error::Error;
+pub use error::{Error, Field, Row};
 pub use table::{Columns, Table};
 
 use crate::random::Random;

@@ -1,5 +1,6 @@
 //! A table of samples in memory: columns found by name, numbers as people write them, and what was taken otherwise than it stands.
 
+use super::error::{Field, Row};
 use super::names::{Name, Unit};
 use super::text::{LONGEST, Separator, Sheet};
 use super::{Error, Matrix, Pairs, Poses, angles, require_rows, times};
@@ -183,20 +184,20 @@ impl Table {
                 let both = separator == Separator::Byte(b',')
                     && (expected + 1..=2 * expected).contains(&found)
                     && record.iter().filter(|field| whole(field)).count() * 4 > found * 3;
-                let (file, line, row) = (self.file.clone(), *line, row + 1);
+                let at = Row {
+                    file: self.file.clone(),
+                    line: *line,
+                    row: row + 1,
+                };
                 return Err(if both {
                     Error::BothCommas {
-                        file,
-                        line,
-                        row,
+                        at,
                         found,
                         expected,
                     }
                 } else {
                     Error::Ragged {
-                        file,
-                        line,
-                        row,
+                        at,
                         found,
                         expected,
                     }
@@ -319,35 +320,28 @@ impl Table {
 
     /// A finite number that stays finite as f32.
     pub(super) fn number(&self, row: usize, place: usize) -> Result<f64, Error> {
-        let (line, record) = &self.rows[row];
-        let text = record.get(place).unwrap_or_default();
-        let (file, line, row) = (self.file.clone(), *line, row + 1);
-        let (column, value) = (self.header[place].written.clone(), text.to_owned());
+        let text = self.rows[row].1.get(place).unwrap_or_default();
         match self.parse(text) {
             Some(value) if (value as f32).is_finite() => Ok(value),
-            Some(_) => Err(Error::NotFinite {
-                file,
-                line,
-                row,
-                column,
-                value,
-            }),
+            Some(_) => Err(Error::NotFinite(self.field(row, place))),
             None if self.decimal_comma && text.contains('.') && text.parse::<f64>().is_ok() => {
-                Err(Error::TwoMarks {
-                    file,
-                    line,
-                    row,
-                    column,
-                    value,
-                })
+                Err(Error::TwoMarks(self.field(row, place)))
             }
-            None => Err(Error::NotNumeric {
-                file,
-                line,
-                row,
-                column,
-                value,
-            }),
+            None => Err(Error::NotNumeric(self.field(row, place))),
+        }
+    }
+
+    /// The field of a row (from 0) in a column of the header.
+    pub(super) fn field(&self, row: usize, place: usize) -> Field {
+        let (line, record) = &self.rows[row];
+        Field {
+            row: Row {
+                file: self.file.clone(),
+                line: *line,
+                row: row + 1,
+            },
+            column: self.header[place].written.clone(),
+            value: record.get(place).unwrap_or_default().to_owned(),
         }
     }
 

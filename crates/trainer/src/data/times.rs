@@ -212,11 +212,7 @@ fn is_new_clip(written: &[f64], before: usize, row: usize, step: f64) -> bool {
 
 fn refusal(table: &Table, place: usize, written: &[f64], before: usize, row: usize) -> Error {
     Error::TimeNotIncreasing {
-        file: table.file.clone(),
-        line: table.rows[row].0,
-        row: row + 1,
-        column: table.header[place].written.clone(),
-        time_s: written[row],
+        at: table.field(row, place),
         before: written[before],
     }
 }
