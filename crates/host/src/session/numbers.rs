@@ -347,6 +347,8 @@ mod tests {
         assert!(!blamed(20, 3_000));
         assert!(blamed(21, 3_000));
         assert!(blamed(1, 20_000));
+        // A stop, which is told as one.
+        assert!(!blamed(1, 2_000_000));
     }
 
     #[test]

@@ -209,10 +209,11 @@ impl Summary {
         )
     }
 
-    /// Whether the bridge's own steps came so late that samples and replies grew old in this computer.
+    /// Whether the bridge's own steps came so late that samples and replies grew old in this computer. A program that somebody
+    /// stopped, or a computer that slept, stood still and is not busy.
     pub fn too_busy(&self) -> bool {
         u64::from(self.late_steps) * LATE_ONE_IN > u64::from(self.steps)
-            || self.worst_late_us >= VERY_LATE_US
+            || (self.worst_late_us >= VERY_LATE_US && self.stalls.unwrap_or(0) == 0)
     }
 }
 
