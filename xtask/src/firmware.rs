@@ -145,7 +145,7 @@ pub fn emulate(options: &[&str]) -> Result<(), Failure> {
         "weights flash: {} (kept until you remove it); Ctrl-C ends",
         at("flash")
     );
-    step::run("qemu", &mut qemu)
+    Err(step::become_program("qemu", &mut qemu))
 }
 
 /// The glove's and the gripper's device.

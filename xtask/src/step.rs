@@ -1,5 +1,6 @@
 //! Running one program as a named step: what it is, how long it took, and a clear word when it fails.
 
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 use std::time::Instant;
@@ -38,6 +39,13 @@ pub fn run(name: &str, command: &mut Command) -> Result<(), Failure> {
     Ok(())
 }
 
+/// Becomes `command`: whoever ends this process (Ctrl-C, `kill` by its id) ends that program, and none is left behind.
+pub fn become_program(name: &str, command: &mut Command) -> Failure {
+    println!("==> {name}");
+    let error = command.exec();
+    format!("{name}: cannot start {:?}: {error}", command.get_program())
+}
+
 /// Whether `command` starts and ends well; its errors stand on the terminal.
 pub fn says(command: &mut Command) -> bool {
     command
@@ -49,4 +57,51 @@ pub fn says(command: &mut Command) -> bool {
 /// Whether `command` starts and ends well; its output is dropped.
 pub fn succeeds(command: &mut Command) -> bool {
     command.output().is_ok_and(|output| output.status.success())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::time::Duration;
+
+    /// Set for the process that becomes another program.
+    const BECOMES: &str = "GAUNTLET_XTASK_BECOMES";
+
+    #[test]
+    fn whoever_ends_the_chore_ends_the_program_that_it_became() {
+        if std::env::var_os(BECOMES).is_some() {
+            panic!(
+                "{}",
+                become_program("sleep", Command::new("sleep").arg("60"))
+            );
+        }
+        let own = std::env::current_exe().expect("this test's program");
+        let mut child = Command::new(own)
+            .args([
+                "--exact",
+                "step::tests::whoever_ends_the_chore_ends_the_program_that_it_became",
+            ])
+            .env(BECOMES, "1")
+            .stdout(Stdio::null())
+            .spawn()
+            .expect("a process");
+        let comm = format!("/proc/{}/comm", child.id());
+        let end = Instant::now() + Duration::from_secs(20);
+        while std::fs::read_to_string(&comm).unwrap_or_default().trim() != "sleep" {
+            let ended = child.try_wait().expect("its status");
+            assert!(
+                ended.is_none() && Instant::now() < end,
+                "it became nothing: {ended:?}"
+            );
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        assert!(says(
+            Command::new("kill").args(["-TERM", &child.id().to_string()])
+        ));
+        let status = child.wait().expect("its status");
+        assert_eq!(
+            std::os::unix::process::ExitStatusExt::signal(&status),
+            Some(15)
+        );
+    }
 }

@@ -27,7 +27,7 @@ With hardware:
   gauntlet ports                                 which serial ports are there
   gauntlet doctor --gripper /dev/ttyUSB1 --glove /dev/ttyUSB0
   gauntlet train --poses my_hand.csv --out model.safetensors
-  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
+  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors --calibrate-flat
 
 `gauntlet help VERB` explains a verb and shows examples.
 Exit codes: 0 done, 1 failed, 2 wrong usage."
@@ -135,7 +135,7 @@ Examples:
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors   (in another terminal)
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
 ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
@@ -203,7 +203,7 @@ pub enum Hand {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Examples:
-  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
+  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors --calibrate-flat
   gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
 
 Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \

@@ -1,6 +1,9 @@
 //! Files the tool writes: never over an input, never over something else than a file of their own kind.
+//!
+//! One rule for the exit code, in every verb: 2 where another command line would do (the name is taken, names a folder, or its folder
+//! is not there), 1 where the system refuses (a full disk, one that is read-only, a folder of somebody else's).
 
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -9,6 +12,7 @@ use anyhow::Result;
 use trainer::whole_file;
 
 use host::failure::Failure;
+use host::words;
 
 /// What is to be written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -45,27 +49,31 @@ impl Kind {
     }
 }
 
-/// Refuses to write `path` where anything is there already, an empty file, too, or where its folder takes no file.
+/// Refuses to write `path` where anything is there already, an empty file, too, or where its folder takes no file of a log's first
+/// half second.
 ///
 /// # Errors
-/// A usage failure that names the path.
+/// A failure that names the path.
 pub fn check_new(path: &Path) -> Result<()> {
-    let next = "another name, in a folder that exists and that you may write to";
-    let refuse = |why: &str| {
-        let what = format!("{} is not written: {why}", path.display());
-        Err(Failure::usage(what, next).into())
-    };
     if std::fs::symlink_metadata(path).is_ok() {
-        return refuse("it exists, and a log is never written over anything");
+        return Err(refusal(
+            path,
+            "it exists, and a log is never written over anything",
+        ));
     }
-    let folder = folder_of(path);
-    if !folder.is_dir() {
-        return refuse("its folder does not exist");
+    place_of_file(path)?;
+    try_room(path, LOG_ROOM)
+}
+
+/// Refuses a path whose folder does not exist, or that names a folder.
+fn place_of_file(path: &Path) -> Result<()> {
+    if !folder_of(path).is_dir() {
+        return Err(refusal(path, "its folder does not exist"));
     }
-    match rustix::fs::access(folder, rustix::fs::Access::WRITE_OK) {
-        Ok(()) => Ok(()),
-        Err(error) => refuse(&format!("its folder takes no file: {error}")),
+    if path.as_os_str().as_bytes().ends_with(b"/") {
+        return Err(refusal(path, "it names a folder"));
     }
+    Ok(())
 }
 
 /// What the header of a checkpoint names, and that of a model.
@@ -75,6 +83,8 @@ const MODEL: &[u8] = b"\"f.w1\"";
 const HEADER: u64 = 64 << 10;
 /// The room that a model, a checkpoint or an image may need.
 const ROOM: usize = 1 << 20;
+/// The room that a log takes at its start.
+const LOG_ROOM: usize = 64 << 10;
 
 /// Eight bytes length of the header, then a JSON object.
 fn is_safetensors(start: &[u8], length: u64) -> bool {
@@ -123,15 +133,10 @@ fn is_same(a: &Path, b: &Path) -> bool {
 /// full disk or a name too long are told now, not after the work.
 ///
 /// # Errors
-/// A usage failure that names the path.
+/// A failure that names the path.
 pub fn check(path: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
     let refuse = |why: &str| Err(refusal(path, why));
-    if !folder_of(path).is_dir() {
-        return refuse("its folder does not exist");
-    }
-    if path.as_os_str().as_bytes().ends_with(b"/") {
-        return refuse("it names a folder");
-    }
+    place_of_file(path)?;
     if inputs.iter().any(|input| is_same(path, input)) {
         return refuse("it is an input of this very command");
     }
@@ -149,14 +154,33 @@ pub fn check(path: &Path, kind: Kind, inputs: &[&Path]) -> Result<()> {
 /// Tries whether a file could be written to `path` now.
 ///
 /// # Errors
-/// A usage failure that names the path.
+/// A failure that names the path.
 pub fn room(path: &Path) -> Result<()> {
-    whole_file::probe(path, ROOM).map_err(|error| refusal(path, &error.to_string()))
+    try_room(path, ROOM)
 }
 
+fn try_room(path: &Path, length: usize) -> Result<()> {
+    let Err(error) = whole_file::probe(path, length) else {
+        return Ok(());
+    };
+    let why = words::disk(&error);
+    Err(match error.kind() {
+        ErrorKind::InvalidFilename | ErrorKind::NotFound | ErrorKind::NotADirectory => {
+            refusal(path, &why)
+        }
+        _ => Failure::new(not_written(path, &why), NEXT).into(),
+    })
+}
+
+const NEXT: &str = "another name, in a folder that exists, has room and lets you write";
+
+/// A name that will not do.
 fn refusal(path: &Path, why: &str) -> anyhow::Error {
-    let what = format!("{} is not written: {why}", path.display());
-    Failure::usage(what, "another name, in a folder that exists and has room").into()
+    Failure::usage(not_written(path, why), NEXT).into()
+}
+
+fn not_written(path: &Path, why: &str) -> String {
+    format!("{} is not written: {why}", path.display())
 }
 
 /// Why what is there is not replaced by something of this kind.

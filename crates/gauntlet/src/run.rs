@@ -22,7 +22,7 @@ use host::failure::OrFail;
 use host::interrupt::Interrupt;
 use host::recording::{QUEUE, SessionLog};
 use host::session::record::{self, Feed, Records, Sort};
-use host::session::{Ending, Order, Session, Snapshot};
+use host::session::{Driver, Ending, Order, Session, Snapshot};
 use shown::Shown;
 
 pub use finished::Finished;
@@ -102,6 +102,8 @@ pub struct Run {
     /// When a file grew to its limit.
     file_limit: Option<Instant>,
     ending: Option<Ending>,
+    /// The gripper was told to activate.
+    activated: bool,
 }
 
 impl Run {
@@ -126,6 +128,7 @@ impl Run {
             unseen: false,
             file_limit: None,
             ending: None,
+            activated: false,
         }
     }
 
@@ -202,18 +205,13 @@ impl Run {
     pub fn drive(&mut self, options: &Options) -> Result<End> {
         self.start_log()?;
         let driven = self.watch(options);
-        self.ending = self.ending();
+        self.ending = self.session.hub().ending(Driver {
+            attended: self.attended,
+            engages: options.engage,
+            closed: self.clutch.ours(),
+            expired: self.clutch.expired,
+        });
         driven
-    }
-
-    fn ending(&self) -> Option<Ending> {
-        let hub = self.session.hub();
-        let mut ending = hub.ending(self.attended, self.clutch.expired)?;
-        if !self.clutch.ours() {
-            // Who only watches is not to blame for what another host's run came to.
-            (ending.held, ending.disobeyed) = (None, None);
-        }
-        Some(ending)
     }
 
     fn watch(&mut self, options: &Options) -> Result<End> {
@@ -310,6 +308,7 @@ impl Run {
             log,
             stopped,
             ending: self.ending,
+            activated: self.activated,
         }
     }
 

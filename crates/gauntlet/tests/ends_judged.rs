@@ -157,3 +157,25 @@ fn a_run_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
     let error = refusal(&output, 1);
     assert!(error.contains("never moved"), "{error}");
 }
+
+#[test]
+fn ctrl_c_before_driving_began_has_failed_and_says_what_was_written() {
+    let mut bench = Bench::new(&["--engage"]);
+    // It is never calibrated.
+    bench.hand_moves();
+    let running = Running::start(
+        command(&bench.arguments())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    );
+    std::thread::sleep(Duration::from_secs(6));
+    interrupt(&running.0);
+    let error = refusal(&running.finish(), 1);
+    assert!(error.contains("interrupted"), "{error}");
+    assert!(
+        error.contains("nothing was written to the gripper") || error.contains("nothing was moved"),
+        "{error}"
+    );
+    assert_eq!(bench.gripper.writes(), 0);
+    bench.glove_port.take();
+}

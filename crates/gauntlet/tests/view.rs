@@ -65,13 +65,41 @@ fn a_moving_hand_is_not_calibrated_on_the_view_says_so_and_the_clutch_moves_noth
     bench.arguments.retain(|word| word != "--calibrate-flat");
     bench.hand_moves();
     let mut terminal = Terminal::start(&bench.arguments());
-    until_shown(&mut terminal, &["all", "well"]);
+    until_shown(
+        &mut terminal,
+        &["idle:", "not", "calibrated", "press", "flat"],
+    );
+    let shown = terminal.redrawn();
+    for wrong in ["well", "closes"] {
+        assert!(!shown.contains(wrong), "{wrong}: {shown}");
+    }
     terminal.keys(b"c");
     until_shown(&mut terminal, &["calibrating"]);
     until_shown(&mut terminal, &["not", "calibrated:", "still"]);
     terminal.keys(b" ");
     until_shown(&mut terminal, &["holding", "calibrated:", "open"]);
     assert_eq!(bench.gripper.writes(), 0, "something was commanded");
+    terminal.keys(b"q");
+    assert_eq!(ends_soon(&mut terminal.child), Some(0));
+}
+
+#[test]
+fn a_refused_calibration_leaves_the_one_before_and_the_view_says_so_and_why() {
+    let bench = Bench::new(&[]);
+    let mut terminal = Terminal::start(&bench.arguments());
+    until_shown(&mut terminal, &["all", "well"]);
+    bench.hand_moves();
+    terminal.keys(b"c");
+    until_shown(&mut terminal, &["refused,", "before", "stays", "hand"]);
+    let shown = terminal.redrawn();
+    assert!(!shown.contains("calibrated"), "{shown}");
+    std::thread::sleep(LONG);
+    until_shown(&mut terminal, &["all", "well", "closes"]);
+    // With the clutch closed the key that opens it is named.
+    terminal.keys(b" ");
+    until_shown(&mut terminal, &["following"]);
+    terminal.keys(b"c");
+    until_shown(&mut terminal, &["refused,", "(space)"]);
     terminal.keys(b"q");
     assert_eq!(ends_soon(&mut terminal.child), Some(0));
 }

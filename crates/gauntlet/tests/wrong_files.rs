@@ -319,6 +319,66 @@ fn outputs_that_cannot_be_written_are_refused_before_the_work() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
 }
 
+/// A verb that is to write `out`, on a disk of its own mounted with `options`; `None` where this machine lets nobody mount one.
+fn on_a_disk(options: &str, words: &[&str]) -> Option<std::process::Output> {
+    let folder = tempfile::tempdir().unwrap();
+    let script = format!(
+        "mount -t tmpfs -o {options} tmpfs '{}' || exit 77; exec \"$@\"",
+        path(folder.path())
+    );
+    let out = folder.path().join("out");
+    let words = words.iter().map(|word| match *word {
+        "OUT" => path(&out),
+        word => word,
+    });
+    let output = std::process::Command::new("unshare")
+        .args(["--user", "--map-root-user", "--mount", "sh", "-c", &script])
+        .args(["sh", env!("CARGO_BIN_EXE_gauntlet")])
+        .args(words)
+        .output()
+        .ok()?;
+    let mounted = output.status.code() != Some(77) && !text(&output.stderr).contains("unshare:");
+    mounted.then_some(output)
+}
+
+#[test]
+fn a_disk_that_is_full_or_read_only_has_one_exit_code_in_every_verb_before_the_work() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 60);
+    let (poses, model) = (path(&poses), path(model()));
+    let checkpoint = folder.path().join("m");
+    let teleop = "teleop --glove /nowhere/a --gripper /nowhere/b --log OUT --model";
+    let verbs: [Vec<&str>; 6] = [
+        vec!["train", "--poses", poses, "--out", "OUT"],
+        vec![
+            "train",
+            "--poses",
+            poses,
+            "--out",
+            path(&checkpoint),
+            "--checkpoint",
+            "OUT",
+        ],
+        vec!["export", model, "--out", "OUT"],
+        vec!["demo", "--poses", poses, "--log", "OUT"],
+        teleop.split(' ').chain([model]).collect(),
+        "bridge log --bridge unix:/nowhere/c --out OUT"
+            .split(' ')
+            .collect(),
+    ];
+    for (options, told) in [("size=4k", "no space left"), ("ro", "read-only")] {
+        for words in &verbs {
+            let Some(output) = on_a_disk(options, words) else {
+                rig::skip::skipped(rig::skip::Need::Machine, "no disk can be mounted here");
+                return;
+            };
+            let error = refusal(&output, 1);
+            assert!(error.contains(told), "{words:?}: {error}");
+            assert!(error.contains("/out is not written"), "{words:?}: {error}");
+        }
+    }
+}
+
 #[test]
 fn text_in_another_encoding_is_named_with_the_way_out() {
     let folder = tempfile::tempdir().unwrap();

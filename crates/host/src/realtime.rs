@@ -13,6 +13,10 @@ use thread_priority::unix::{
 };
 use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
+/// What helps where the bridge's own steps come late, as a next step.
+pub const LESS_TO_DO: &str = "a computer with less to do: close other programs, or allow this user real-time priority \
+                              (docs/tool.md, `rtprio`)";
+
 /// Above every ordinary program, below the kernel's own threads (50).
 const PRIORITY: u8 = 10;
 
@@ -23,6 +27,18 @@ pub enum Scheduling {
     Realtime,
     /// They share the processor with all other programs.
     Shared,
+}
+
+impl Scheduling {
+    /// The same in the middle of a sentence, without what is there already.
+    pub fn less_to_do(self) -> &'static str {
+        match self {
+            Self::Realtime => "close other programs",
+            Self::Shared => {
+                "close other programs, or allow this user real-time priority (docs/tool.md, `rtprio`)"
+            }
+        }
+    }
 }
 
 impl fmt::Display for Scheduling {

@@ -167,6 +167,22 @@ pub fn short_or_dash(us: Option<u64>) -> String {
     us.map_or_else(|| "–".to_owned(), short)
 }
 
+/// A time as a person reads it, of whatever length: `30.0 ms`, `3.2 s`, `1 min 05 s`.
+pub fn time(time: Duration) -> String {
+    match u64::try_from(time.as_micros()) {
+        Ok(us) if us < 100_000 => short(us),
+        _ => seconds(time),
+    }
+}
+
+/// How often: `once`, `7 times`.
+pub fn times(count: u32) -> String {
+    match count {
+        1 => "once".to_owned(),
+        count => format!("{count} times"),
+    }
+}
+
 /// Seconds as a person reads them: `3.2 s`, `1 min 05 s`.
 pub fn seconds(time: Duration) -> String {
     let s = time.as_secs_f64();

@@ -3,6 +3,7 @@
 use glove::hand;
 use glove::scan::Health;
 use gripper::{Activation, Contact};
+use rustix::io::Errno;
 
 use gripper::space::AXES;
 /// The gripper's axes as a person reads them; files have [`crate::session::record::AXIS_NAMES`].
@@ -116,6 +117,20 @@ pub fn impossible_sensors(impossible: u16) -> Option<String> {
             names.join(", ")
         )
     })
+}
+
+/// Why a file is not written.
+pub fn disk(error: &std::io::Error) -> String {
+    match error.raw_os_error().map(Errno::from_raw_os_error) {
+        Some(Errno::NOSPC) => "no space left on the disk".to_owned(),
+        Some(Errno::DQUOT) => "no space left: your quota on that disk is used up".to_owned(),
+        Some(Errno::FBIG) => {
+            "the file is as long as the system lets this program make one (`ulimit -f`)".to_owned()
+        }
+        Some(Errno::ROFS) => "its folder is on a disk that is read-only".to_owned(),
+        Some(Errno::ACCESS | Errno::PERM) => "you may not write in its folder".to_owned(),
+        _ => error.to_string(),
+    }
 }
 
 /// The segments of a mask, by name.

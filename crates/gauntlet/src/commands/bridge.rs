@@ -13,9 +13,9 @@ use serde_json::json;
 use super::bridge_log::Poses;
 use super::flash::slot_lines;
 use crate::cli::{Bridge, BridgeAt, BridgeVerb};
-use crate::out;
 use crate::run::{Finished, Options, Run};
 use crate::tell::Tell;
+use crate::{out, outputs};
 use host::chip::link::{Error, HostLink};
 use host::clock::Clock;
 use host::failure::Failure;
@@ -257,9 +257,12 @@ fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
     // An older bridge is refused by name.
     let health = link.health().map_err(Failure::from)?;
     let mut run = start(link, None, interrupt)?;
-    let taken = run.calibrate(&tell);
+    let taken = run.calibrate(&tell).and_then(|taken| match taken {
+        true => Ok(()),
+        false => Err(Failure::interrupted("before the hand was taken").into()),
+    });
     let now = run.snapshot().map(|seen| seen.calibration);
-    run.finish().judge(taken)?;
+    run.finish().judge_prepared(taken)?;
     if at.json {
         let calibration = now.unwrap_or(health.calibration);
         return calibration_json(Health {
@@ -285,6 +288,7 @@ fn monitor(at: &BridgeAt, seconds: Option<Duration>, interrupt: &Interrupt) -> R
 
 fn log(at: &BridgeAt, path: &Path, seconds: Option<Duration>, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(at.json);
+    outputs::check_new(path)?;
     let link = connect(at)?;
     let (poses, samples) = Poses::create(path, interrupt)?;
     let driven = start(link, Some(samples), interrupt).map(|mut run| {

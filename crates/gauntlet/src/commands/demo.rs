@@ -107,7 +107,7 @@ pub(super) fn trained(
         if options.no_start_pairs { "no start pairs" } else { "2 start pairs (open hand, fist)" }
     ));
     tell.say(format_args!(
-        "           short schedule of {} epochs (the paper's is 8,000 + 100 a pair: `gauntlet train --schedule paper`)",
+        "           fast schedule, {} epochs (the paper's is 8,000 + 100 a pair: `gauntlet train --schedule paper`)",
         request.total_epochs()
     ));
     let outcome = train(&request, interrupt)?;

@@ -28,7 +28,7 @@ pub struct Export {
     /// The trained model.
     #[arg(value_name = "MODEL.safetensors")]
     pub model: PathBuf,
-    /// Where the image goes.
+    /// Where the image goes. An image that is there is replaced; anything else never.
     #[arg(long, value_name = "IMAGE")]
     pub out: PathBuf,
     /// Write the weights as 16-bit integers, calibrated on these hand poses: faster on a chip, half as long.
@@ -48,6 +48,7 @@ pub(super) fn run(options: &Export) -> Result<()> {
     let mut inputs = vec![options.model.as_path()];
     inputs.extend(options.int16.as_deref());
     outputs::check(&options.out, Kind::Image, &inputs)?;
+    let replaced = options.out.metadata().is_ok_and(|there| there.len() > 0);
     let weights = model::weights(&options.model, options.int16.as_deref(), &Person)?;
     whole_file::write(&options.out, &weights.image).or_fail(
         || format!("{} is not written", options.out.display()),
@@ -57,6 +58,7 @@ pub(super) fn run(options: &Export) -> Result<()> {
         return out::json(&json!({
             "image": options.out,
             "bytes": weights.image.len(),
+            "replaced": replaced,
             "int16": weights.int16,
         }));
     }
@@ -64,9 +66,14 @@ pub(super) fn run(options: &Export) -> Result<()> {
         tell.say(format_args!("int16      {}", int16.line()));
     }
     tell.say(format_args!(
-        "image      {}, {} bytes",
+        "image      {}, {} bytes{}",
         options.out.display(),
-        weights.image.len()
+        weights.image.len(),
+        if replaced {
+            ", in the place of the image that was there"
+        } else {
+            ""
+        }
     ));
     Ok(())
 }

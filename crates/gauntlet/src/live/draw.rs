@@ -178,10 +178,10 @@ fn rates(view: &View) -> Vec<Line<'static>> {
         view.frames_per_s, view.cycles_per_s, view.dropped
     );
     let second = format!(
-        "sample to command: p50 {}, p99 {}   faults so far {}",
+        "sample to command: p50 {}, p99 {}   gripper faults so far {}",
         short_or_dash(view.latency_p50),
         short_or_dash(view.latency_p99),
-        view.fault_count
+        view.gripper_faults
     );
     vec![Line::raw(first), Line::raw(second)]
 }

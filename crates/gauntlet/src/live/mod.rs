@@ -36,6 +36,9 @@ const LOOKED: Duration = Duration::from_millis(300);
 /// A space bar that comes again within this is held down: terminals wait half a second before they repeat.
 const REPEATS: Duration = Duration::from_millis(700);
 
+/// What the lines say that stand for a view.
+const LEGEND: &str = "           a line a second: the state, each axis asked→at (counts, 0 open to 255 closed), rates, what is wrong";
+
 /// What a person asked for with a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Key {
@@ -134,6 +137,7 @@ impl Live {
         } else if std::io::stdout().is_terminal() && terminal {
             Target::Drawn(Box::new(Drawn::start()?))
         } else {
+            say!("{LEGEND}");
             Target::Lines
         };
         Ok(Self {

@@ -52,7 +52,7 @@ fn view() -> View {
         latency_p99: Some(41_700),
         dropped: 3,
         faults: vec!["sensor ring_middle: no answer".to_owned()],
-        fault_count: 2,
+        gripper_faults: 2,
         keys: "space: clutch   q: stop",
     }
 }

@@ -63,8 +63,8 @@ pub struct View {
     pub dropped: u64,
     /// What is wrong now, in words; empty when all is well.
     pub faults: Vec<String>,
-    /// Faults since the start.
-    pub fault_count: u64,
+    /// How often a fault of the gripper ended motion.
+    pub gripper_faults: u32,
     /// What keys do.
     pub keys: &'static str,
 }

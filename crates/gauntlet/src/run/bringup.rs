@@ -9,7 +9,7 @@ use super::Run;
 use crate::tell::Tell;
 use gripper::Activation;
 use host::failure::Failure;
-use host::session::{Order, Snapshot, refused};
+use host::session::{Order, Snapshot, kept, refused};
 
 /// For a person to lay the hand flat and hold it still.
 pub const WAIT: Duration = Duration::from_secs(30);
@@ -50,13 +50,16 @@ impl Run {
                 break;
             }
         }
-        let newest = self.session.snapshot().map(|seen| seen.calibration.newest);
-        match newest {
+        let now = self.session.snapshot().map(|seen| seen.calibration);
+        match now.map(|now| now.newest) {
             Some(Try::Taken) => {
                 tell.say(format_args!("{DONE}"));
                 Ok(true)
             }
-            Some(Try::Refused(why)) => Err(refused(why).into()),
+            Some(Try::Refused(why)) => Err(match now.is_some_and(|now| now.is_calibrated) {
+                true => kept(why).into(),
+                false => refused(why).into(),
+            }),
             _ => Err(Failure::new(
                 "the bridge did not say how the calibration ended",
                 "the same again",
@@ -79,6 +82,7 @@ impl Run {
             return Ok(true);
         }
         tell.say(format_args!("activating the gripper: its fingers move"));
+        self.activated = true;
         self.order(Order::Activate);
         let ready = self.wait(ACTIVATION_WAIT, ready)?;
         if ready || self.asked() {

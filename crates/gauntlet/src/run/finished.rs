@@ -3,7 +3,7 @@
 use anyhow::Result;
 
 use crate::tell::Tell;
-use host::failure::with_others;
+use host::failure::{Failure, with_others};
 use host::recording::Written;
 use host::session::{Ending, Stopped, Summary};
 
@@ -18,6 +18,8 @@ pub struct Finished {
     pub stopped: Result<Stopped>,
     /// How everything was before that; `None` where driving never began.
     pub ending: Option<Ending>,
+    /// The gripper was told to activate.
+    pub activated: bool,
 }
 
 impl Finished {
@@ -49,12 +51,41 @@ impl Finished {
         }
     }
 
+    /// The judgement over a run that was to drive, or to watch. One that somebody ended before that began has not done its work.
+    ///
+    /// # Errors
+    /// As [`Finished::judge_prepared`].
+    pub fn judge<T>(self, driven: Result<T>) -> Result<T> {
+        let driven = match self.ending {
+            Some(_) => driven,
+            None => driven.and_then(|_| Err(self.interrupted().into())),
+        };
+        self.judge_prepared(driven)
+    }
+
+    /// Ended before driving began: what was done and what was not.
+    fn interrupted(&self) -> Failure {
+        let left = match (self.activated, &self.stopped) {
+            (true, Ok(Stopped::Untouched)) => {
+                "; the gripper was activated, and nothing else was written to it".to_owned()
+            }
+            (false, Ok(Stopped::Untouched)) => "; nothing was written to the gripper".to_owned(),
+            _ => self
+                .left()
+                .map_or_else(String::new, |left| format!("; {left}")),
+        };
+        Failure::new(
+            format!("interrupted before driving began{left}"),
+            "the same again",
+        )
+    }
+
     /// The judgement. Whether the gripper may still move comes first, then what ended the run (`driven`), what was broken at
     /// its end, and the log.
     ///
     /// # Errors
-    /// The first of the failures; the others are noted before it.
-    pub fn judge<T>(self, driven: Result<T>) -> Result<T> {
+    /// The first of the failures; the others are told after it.
+    pub fn judge_prepared<T>(self, driven: Result<T>) -> Result<T> {
         let stopped = self.stopped.and_then(|stopped| stopped.judge().map(drop));
         let ending = self.ending.map_or(Ok(()), Ending::judge);
         let log = self.log.as_ref().map_or(Ok(()), Written::judge);
@@ -95,6 +126,7 @@ fn first_failure<T>(
 mod tests {
     use super::*;
     use bridge::{HoldReason, State};
+    use host::session::{Driven, Driver};
 
     fn finished(stopped: Result<Stopped>, ending: Option<Ending>, fault: Option<&str>) -> Finished {
         Finished {
@@ -108,15 +140,17 @@ mod tests {
             }),
             stopped,
             ending,
+            activated: false,
         }
     }
 
     fn well() -> Ending {
         Ending {
             state: State::Following,
-            attended: false,
-            expired: false,
+            driver: Driver::default(),
             held: None,
+            driven: Driven::default(),
+            too_busy: false,
             glove_answers: true,
             useless: None,
             gripper_answers: true,
@@ -156,12 +190,12 @@ mod tests {
         let broken: [Broken<'_>; 7] = [
             (&|end| end.state = State::Faulted(fault), "fault"),
             (&|end| end.glove_answers = false, "glove no longer sends"),
-            (&|end| end.expired = true, "opened by itself"),
+            (&|end| end.driver.expired = true, "opened by itself"),
             (&|end| end.useless = some("all frozen"), "all frozen"),
             (&|end| end.disobeyed = some("never moved"), "never moved"),
             (
                 &|end| {
-                    end.attended = true;
+                    end.driver.attended = true;
                     end.held = Some(HoldReason::SensorsLost(1));
                 },
                 "sensors lost: hand",
@@ -181,10 +215,32 @@ mod tests {
     }
 
     #[test]
+    fn a_run_that_was_ended_before_driving_began_says_what_was_written_and_has_failed() {
+        for (activated, stopped, words) in [
+            (false, Stopped::Untouched, "nothing was written"),
+            (true, Stopped::Untouched, "was activated, and nothing else"),
+            (true, Stopped::Held, "the gripper is held where it is"),
+            (true, Stopped::Activating, "the gripper is activating"),
+        ] {
+            let run = Finished {
+                activated,
+                ..finished(Ok(stopped), None, None)
+            };
+            let text = told(run, Ok(()));
+            assert!(text.contains(words), "{text}");
+        }
+        let prepared = finished(Ok(Stopped::Untouched), None, None);
+        assert!(prepared.judge_prepared(Ok(())).is_ok());
+    }
+
+    #[test]
     fn a_person_at_the_keys_may_end_a_run_that_waits_for_them() {
         for held in [HoldReason::NotCalibrated, HoldReason::Settling] {
             let ending = Ending {
-                attended: true,
+                driver: Driver {
+                    attended: true,
+                    ..Driver::default()
+                },
                 held: Some(held),
                 ..well()
             };

@@ -3,9 +3,10 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use bridge::State;
-use bridge::calibration::Try;
+use bridge::calibration::{Refusal, Try};
+use bridge::clutch::Position;
 use bridge::event::Kind;
+use bridge::{HoldReason, State};
 use glove::hand::{LIMITS, SEGMENT_COUNT};
 use glove::scan::{Finding, Health};
 use gripper::{Activation, Contact};
@@ -69,9 +70,10 @@ impl Shown {
         &mut self,
         snapshot: &Snapshot,
         scheduling: Option<Scheduling>,
+        hands: Hands,
         now: Instant,
     ) -> Vec<String> {
-        let mut faults = standing(snapshot);
+        let mut faults = standing(snapshot, hands);
         let line = snapshot.line.as_ref();
         faults.extend(line.and_then(|line| self.replies.look(now, line)));
         faults.extend(scheduling.and_then(|known| self.busy(snapshot, known, now)));
@@ -99,14 +101,9 @@ impl Shown {
         let held = matches!(snapshot.state, State::Holding(_) | State::SafeAction(_));
         let recently = grew.is_some_and(|at| now.saturating_duration_since(at) < BUSY);
         (held && recently).then(|| {
-            let help = match scheduling {
-                Scheduling::Realtime => "",
-                Scheduling::Shared => {
-                    ", or allow this user real-time priority (docs/tool.md, `rtprio`)"
-                }
-            };
             format!(
-                "this computer is too busy: {steps} steps came late so far; close other programs{help}"
+                "this computer is too busy: {steps} steps came late so far; {}",
+                scheduling.less_to_do()
             )
         })
     }
@@ -183,7 +180,10 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
         Kind::Sensors(Finding::Impossible { .. }) => true,
         Kind::Sensors(Finding::Frozen { segment }) => is_good(snapshot, (*segment).into()),
         Kind::Sensors(Finding::AllFrozen) => (0..SEGMENT_COUNT).any(|k| is_good(snapshot, k)),
-        Kind::Calibration(end) => snapshot.calibration.newest != *end,
+        // Where none is in use, `standing` says why as long as it is so.
+        Kind::Calibration(end) => {
+            snapshot.calibration.newest != *end || snapshot.lacks_calibration()
+        }
         Kind::Glove { .. } => snapshot.glove_answers,
         Kind::Gripper { .. } => snapshot.gripper_answers,
         Kind::GripperFault(_) => snapshot
@@ -204,18 +204,78 @@ fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
     }
 }
 
+/// What whoever watches can do from here.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Hands {
+    /// Press keys.
+    Keys,
+    /// Only start the run anew: there is no terminal.
+    Options,
+    /// Nothing: the bridge is only watched.
+    None,
+}
+
+impl Hands {
+    /// `keys`: they can be pressed; `drives`: they do something.
+    pub(super) fn of(keys: bool, drives: bool) -> Self {
+        match (keys, drives) {
+            (true, true) => Self::Keys,
+            (false, true) => Self::Options,
+            (_, false) => Self::None,
+        }
+    }
+
+    /// How a glove is calibrated from here, and how the clutch is opened before it.
+    fn calibrate(self, closed: bool) -> &'static str {
+        match (self, closed) {
+            (Self::Keys, false) => "lay the hand flat and still, press c",
+            (Self::Keys, true) => "open the clutch (space), lay the hand flat and still, press c",
+            (Self::Options, _) => "the same with --calibrate-flat, the hand flat and still",
+            (Self::None, _) => "`gauntlet bridge calibrate` does it",
+        }
+    }
+
+    fn open(self) -> &'static str {
+        match self {
+            Self::Keys => "open the clutch (space)",
+            Self::Options | Self::None => "open the clutch",
+        }
+    }
+}
+
+/// What a glove without a calibration needs, and why the newest try was refused.
+fn not_calibrated(snapshot: &Snapshot, hands: Hands) -> Option<String> {
+    let closed = matches!(snapshot.clutch, Position::Closed | Position::Lost);
+    let calibrate = hands.calibrate(closed);
+    match snapshot.calibration.newest {
+        _ if !snapshot.lacks_calibration() => None,
+        // Said below.
+        Try::Waiting => None,
+        Try::Refused(why) if why != Refusal::Engaged => {
+            Some(format!("not calibrated: {why}; {calibrate}"))
+        }
+        _ => Some(format!("not calibrated: {calibrate}")),
+    }
+}
+
 /// What is wrong now and stays so.
-fn standing(snapshot: &Snapshot) -> Vec<String> {
+fn standing(snapshot: &Snapshot, hands: Hands) -> Vec<String> {
     let mut faults = Vec::new();
     match snapshot.state {
+        State::Holding(HoldReason::NotCalibrated) if snapshot.lacks_calibration() => {
+            faults.extend(not_calibrated(snapshot, hands).map(|what| format!("held: {what}")));
+        }
         State::Holding(reason) | State::SafeAction(reason) => {
             faults.push(format!("held: {reason}"));
         }
         State::Faulted(_) => faults.push(format!(
-            "{}: open the clutch, mend it, and close the clutch again",
-            snapshot.state
+            "{}: mend it, {}, and close the clutch again",
+            snapshot.state,
+            hands.open()
         )),
-        State::Idle | State::Blending | State::Following => {}
+        State::Idle | State::Blending | State::Following => {
+            faults.extend(not_calibrated(snapshot, hands));
+        }
     }
     if snapshot.calibration.newest == Try::Waiting {
         faults.push(Kind::Calibration(Try::Waiting).to_string());
@@ -265,4 +325,82 @@ pub(super) fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
             good: good[finger],
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bridge::calibration::CalibrationState;
+    use gripper::Instant as Time;
+
+    /// Of a bridge with devices that work, whose glove is not calibrated.
+    fn uncalibrated(clutch: Position, state: State) -> Snapshot {
+        Snapshot {
+            now: Time::from_ticks(0),
+            state,
+            clutch,
+            calibration: CalibrationState::default(),
+            calibration_known: true,
+            frame_sequence: 1,
+            frame: None,
+            angles: [0.0; glove::hand::JOINT_COUNT],
+            angles_valid: true,
+            distrusted: 0,
+            impossible: 0,
+            command: None,
+            sent: None,
+            status: None,
+            stands: None,
+            glove_answers: true,
+            gripper_answers: true,
+            line: None,
+            late_steps: 0,
+        }
+    }
+
+    #[test]
+    fn a_glove_that_is_not_calibrated_is_said_with_what_this_person_can_do() {
+        let idle = uncalibrated(Position::Open, State::Idle);
+        for (hands, words) in [
+            (Hands::Keys, "press c"),
+            (Hands::Options, "--calibrate-flat"),
+            (Hands::None, "gauntlet bridge calibrate"),
+        ] {
+            let told = standing(&idle, hands).join("; ");
+            assert!(
+                told.starts_with("not calibrated: ") && told.contains(words),
+                "{told}"
+            );
+        }
+        let held = State::Holding(HoldReason::NotCalibrated);
+        let told = standing(&uncalibrated(Position::Closed, held), Hands::Keys).join("; ");
+        assert!(told.contains("open the clutch (space)"), "{told}");
+        let mut calibrated = idle;
+        calibrated.calibration.is_calibrated = true;
+        assert!(standing(&calibrated, Hands::Keys).is_empty());
+        // A bridge of an older version never says.
+        let unknown = Snapshot {
+            calibration_known: false,
+            ..idle
+        };
+        assert!(standing(&unknown, Hands::None).is_empty());
+    }
+
+    #[test]
+    fn why_a_try_was_refused_is_said_as_long_as_there_is_no_calibration() {
+        let mut snapshot = uncalibrated(Position::Open, State::Idle);
+        let refused = Try::Refused(Refusal::Moving {
+            segment: 4,
+            by: 0.3,
+        });
+        snapshot.calibration.newest = refused;
+        let told = standing(&snapshot, Hands::Keys).join("; ");
+        assert!(
+            told.contains("index_proximal") && told.contains("press c"),
+            "{told}"
+        );
+        assert!(over(&Kind::Calibration(refused), &snapshot), "said twice");
+        snapshot.calibration.is_calibrated = true;
+        assert!(!over(&Kind::Calibration(refused), &snapshot));
+    }
 }

@@ -2,9 +2,11 @@
 
 use std::time::{Duration, Instant};
 
+use bridge::State;
 use bridge::clutch::Position;
 
-use super::{Options, Run, shown};
+use super::shown::{self, Hands};
+use super::{Options, Run};
 use crate::live::View;
 use host::session::Snapshot;
 
@@ -27,8 +29,8 @@ impl Run {
             latency_p50: progress.latency_p50,
             latency_p99: progress.latency_p99,
             dropped: progress.dropped,
-            faults: self.faults_now(snapshot.as_ref()),
-            fault_count: progress.faults,
+            faults: self.faults_now(snapshot.as_ref(), Hands::of(keys, options.drives)),
+            gripper_faults: progress.gripper_faults,
             keys: match (keys, options.drives) {
                 (true, true) => {
                     "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
@@ -52,6 +54,9 @@ impl Run {
     /// The state, and what a person can do about it.
     fn state_words(&self, snapshot: &Snapshot, keys: bool) -> String {
         let name = snapshot.state.name();
+        if snapshot.lacks_calibration() && snapshot.state == State::Idle {
+            return format!("{name}: not calibrated");
+        }
         if keys && !self.clutch.closed {
             match snapshot.clutch {
                 Position::Open => return format!("{name}: space closes the clutch"),
@@ -62,7 +67,7 @@ impl Run {
         name.to_owned()
     }
 
-    fn faults_now(&mut self, snapshot: Option<&Snapshot>) -> Vec<String> {
+    fn faults_now(&mut self, snapshot: Option<&Snapshot>, hands: Hands) -> Vec<String> {
         let mut faults = Vec::new();
         for (device, port) in self.session.ports() {
             if !port.plugged() {
@@ -79,7 +84,7 @@ impl Run {
         if let Some(snapshot) = snapshot {
             let scheduling = self.session.scheduling();
             let now = Instant::now();
-            faults.extend(self.shown.faults(snapshot, scheduling, now));
+            faults.extend(self.shown.faults(snapshot, scheduling, hands, now));
         }
         faults
     }

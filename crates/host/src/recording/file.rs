@@ -11,11 +11,11 @@ use std::time::{Duration, Instant};
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{MAGIC, McapResult, WriteOptions, Writer};
-use rustix::io::Errno;
 
 use super::channels::{self, CHANNELS, Channel};
 use crate::clock::Clock;
 use crate::session::record::Record;
+use crate::words::disk;
 
 /// Bytes to a chunk at most; most are closed by time.
 const CHUNK: u64 = 1 << 20;
@@ -257,15 +257,8 @@ impl LogFile {
 
 /// The fault in a person's words.
 fn words(error: &mcap::McapError) -> String {
-    let mcap::McapError::Io(error) = error else {
-        return error.to_string();
-    };
-    match error.raw_os_error().map(Errno::from_raw_os_error) {
-        Some(Errno::NOSPC) => "no space left on the disk".to_owned(),
-        Some(Errno::DQUOT) => "no space left: your quota on that disk is used up".to_owned(),
-        Some(Errno::FBIG) => {
-            "the file is as long as the system lets this program make one (`ulimit -f`)".to_owned()
-        }
-        _ => error.to_string(),
+    match error {
+        mcap::McapError::Io(error) => disk(error),
+        error => error.to_string(),
     }
 }

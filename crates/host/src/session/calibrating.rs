@@ -1,12 +1,53 @@
-//! Why a hand was not taken as flat.
+//! Why a hand was not taken as flat, and what is in use then.
 
-use bridge::calibration::Refusal;
+use bridge::calibration::{CalibrationState, Refusal, Try};
+use bridge::event::Kind;
 
 use crate::failure::Failure;
 
 /// Why the hand was not taken, and what helps.
 pub fn refused(why: Refusal) -> Failure {
-    let next = match why {
+    let why_words = words(why);
+    Failure::new(
+        format!("the glove was not calibrated: {why_words}"),
+        next(why),
+    )
+}
+
+/// The same where a calibration from before stays in use.
+pub fn kept(why: Refusal) -> Failure {
+    let what = Kind::Calibration(Try::Refused(why));
+    let state = CalibrationState {
+        is_calibrated: true,
+        ..CalibrationState::default()
+    };
+    Failure::new(told(&what, &state), next(why))
+}
+
+/// What happened, in words that know which calibration is in use.
+pub(super) fn told(what: &Kind, now: &CalibrationState) -> String {
+    match what {
+        Kind::Calibration(Try::Refused(why)) if now.is_calibrated => {
+            format!(
+                "calibration refused, the one before stays in use: {}",
+                words(*why)
+            )
+        }
+        Kind::Calibration(Try::Refused(why)) => format!("not calibrated: {}", words(*why)),
+        what => what.to_string(),
+    }
+}
+
+/// Why, with what a person at the keys can press.
+fn words(why: Refusal) -> String {
+    match why {
+        Refusal::Engaged => "the clutch is closed: open it first (space)".to_owned(),
+        why => why.to_string(),
+    }
+}
+
+fn next(why: Refusal) -> &'static str {
+    match why {
         Refusal::NoFrames => {
             "the glove's cable and power; `gauntlet doctor` says which layer fails"
         }
@@ -15,8 +56,44 @@ pub fn refused(why: Refusal) -> Failure {
             "the same again, the hand resting on a table until it says done"
         }
         Refusal::Bent { .. } => "the same again, the palm on a table and the fingers stretched",
-        Refusal::Engaged => "opening the clutch first",
+        Refusal::Engaged => {
+            "`gauntlet bridge release --bridge PORT` with its port, where another host left it closed; in the view space opens it"
+        }
         Refusal::NothingBefore => "calibrating on a flat hand",
-    };
-    Failure::new(format!("the glove was not calibrated: {why}"), next)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_refused_try_says_that_the_calibration_before_stays_and_why_the_new_one_was_refused() {
+        let moving = Refusal::Moving {
+            segment: 4,
+            by: 0.3,
+        };
+        let try_refused = Kind::Calibration(Try::Refused(moving));
+        let [with, without] = [true, false].map(|is_calibrated| {
+            let state = CalibrationState {
+                is_calibrated,
+                ..CalibrationState::default()
+            };
+            told(&try_refused, &state)
+        });
+        assert!(with.contains("the one before stays in use"), "{with}");
+        assert!(with.contains("index_proximal"), "{with}");
+        assert!(!with.contains("not calibrated"), "{with}");
+        assert!(without.starts_with("not calibrated: "), "{without}");
+        assert!(!kept(moving).to_string().contains("not calibrated"));
+    }
+
+    #[test]
+    fn what_is_to_be_opened_first_is_named_with_its_key() {
+        let told = refused(Refusal::Engaged).to_string();
+        assert!(
+            told.contains("(space)") && !told.contains("release"),
+            "{told}"
+        );
+    }
 }

@@ -15,10 +15,19 @@ const PAUSE: Duration = Duration::from_millis(30);
 /// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.
 const STATUSES: u32 = 3;
 
-/// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on. `known_us`: the
-/// bridge's clock when it was last heard; one that reads less has started anew, and its counters know nothing of what it commanded.
-pub(super) fn stop(link: &mut HostLink, known_us: u64) -> Stopped {
-    match confirmed(link, known_us) {
+/// What is known of a bridge from when it was last heard: one whose clock reads less, or that counts fewer commands, has started
+/// anew, and knows nothing of what it commanded.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Known {
+    /// Its clock, µs since it started.
+    pub us: u64,
+    /// Commands that left.
+    pub commands: u32,
+}
+
+/// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on.
+pub(super) fn stop(link: &mut HostLink, known: Known) -> Stopped {
+    match confirmed(link, known) {
         Ok(stopped) => stopped,
         Err(_) => Stopped::Unheard,
     }
@@ -44,16 +53,19 @@ pub(super) fn renew(link: &mut HostLink) -> Result<(), Error> {
     link.telemetry(SAMPLE_MS)
 }
 
-fn confirmed(link: &mut HostLink, known_us: u64) -> Result<Stopped, Error> {
+fn confirmed(link: &mut HostLink, known: Known) -> Result<Stopped, Error> {
     // Obeyed without a session, too.
     let released_us = link.release()?.now_us;
-    if released_us < known_us {
+    let at_release = ask(link, HostLink::counters)?;
+    if released_us < known.us || at_release.commands < known.commands {
         return Ok(Stopped::Restarted);
     }
-    let at_release = ask(link, HostLink::counters)?;
     if at_release.commands == 0 {
-        let gripper = link.status()?.gripper;
-        return Ok(match gripper.map(|gripper| gripper.activation) {
+        let status = ask(link, HostLink::status)?;
+        if status.now_us < released_us {
+            return Ok(Stopped::Restarted);
+        }
+        return Ok(match status.gripper.map(|gripper| gripper.activation) {
             Some(Activation::Activating) => Stopped::Activating,
             _ => Stopped::Untouched,
         });
@@ -67,7 +79,10 @@ fn confirmed(link: &mut HostLink, known_us: u64) -> Result<Stopped, Error> {
             let now = sample.state == State::Idle && sample.now_us > released_us;
             command = now.then_some(sample.command);
         }
-        let status = link.status()?;
+        let status = ask(link, HostLink::status)?;
+        if status.now_us < released_us {
+            return Ok(Stopped::Restarted);
+        }
         let counters = link.counters()?;
         let answered = counters.statuses.wrapping_sub(at_release.statuses) >= STATUSES;
         if let (Some(gripper), State::Idle, true) = (&status.gripper, status.state, answered) {

@@ -12,7 +12,8 @@ use bridge::protocol;
 use bridge::protocol::message::{Counters, Sample, Status};
 
 use super::axes::Axes;
-use super::chip_stop::{renew, stop};
+use super::calibrating::told;
+use super::chip_stop::{Known, renew, stop};
 use super::hub::{Happened, Hub, Totals};
 use super::orders::{Order, Queue};
 use super::record::Sort;
@@ -69,6 +70,8 @@ pub(super) struct Worker {
     asked_status: Instant,
     sample: Option<Sample>,
     calibration: CalibrationState,
+    /// The bridge has said so.
+    calibration_known: bool,
     trying: Option<Trying>,
     counted: (Instant, Counters),
     useless: bool,
@@ -85,7 +88,7 @@ impl Worker {
     ) -> Self {
         let now = Instant::now();
         hub.lock().totals = Totals::on_chip(&counters, now);
-        let worker = Self {
+        Self {
             link,
             orders,
             hub,
@@ -98,12 +101,16 @@ impl Worker {
             asked_status: now,
             sample: None,
             calibration: CalibrationState::default(),
+            calibration_known: false,
             trying: None,
             counted: (now, counters),
             useless: false,
-        };
-        worker.say();
-        worker
+        }
+    }
+
+    /// The bridge has said whether its glove is calibrated.
+    pub fn knows(&mut self, is_calibrated: bool) {
+        (self.calibration.is_calibrated, self.calibration_known) = (is_calibrated, true);
     }
 
     pub fn run(mut self) -> Left {
@@ -117,8 +124,9 @@ impl Worker {
                 },
             }
         };
+        let known = self.known();
         let stopped = match self.touched {
-            true => stop(&mut self.link, self.status.now_us),
+            true => stop(&mut self.link, known),
             // Somebody else may drive it.
             false => Stopped::Untouched,
         };
@@ -130,6 +138,14 @@ impl Worker {
         Left { stopped, fault }
     }
 
+    fn known(&self) -> Known {
+        let sampled = self.sample.as_ref().map_or(0, |sample| sample.now_us);
+        Known {
+            us: self.status.now_us.max(sampled),
+            commands: self.counted.1.commands,
+        }
+    }
+
     /// Where this program stood still for so long that the bridge ended its session: a new one. The clutch has opened by itself.
     fn go_on_after(&mut self, error: Error) -> Result<(), Error> {
         if error != Error::Refused(protocol::message::Refusal::NoSession) {
@@ -137,7 +153,7 @@ impl Worker {
         }
         renew(&mut self.link)?;
         let status = self.link.status()?;
-        if status.now_us < self.status.now_us {
+        if status.now_us < self.known().us {
             // The bridge started anew meanwhile, and knows nothing of what was.
             return Err(error);
         }
@@ -250,6 +266,7 @@ impl Worker {
             Err(Error::Older { .. }) => return Ok(()),
             health => health?.calibration,
         };
+        self.calibration_known = true;
         let Some(trying) = &mut self.trying else {
             self.calibration.is_calibrated = now.is_calibrated;
             return Ok(());
@@ -274,10 +291,10 @@ impl Worker {
         self.calibration.newest = newest;
         self.calibration.ended = self.calibration.ended.wrapping_add(1);
         let kind = Kind::Calibration(newest);
-        let refused = matches!(newest, Try::Refused(_));
         self.hub.lock().happened(Happened {
-            sort: if refused { Sort::Fault } else { Sort::Note },
-            text: kind.to_string(),
+            // A hand that was not taken is no fault of a device.
+            sort: Sort::Note,
+            text: told(&kind, &self.calibration),
             kind,
         });
     }
@@ -305,11 +322,11 @@ impl Worker {
         };
         self.useless = all && !told && self.status.active_slot.is_some();
         let mut said = self.hub.lock();
-        said.numbers.chip(&counters, &grown, now.duration_since(at));
+        said.numbers.chip(&grown, now.duration_since(at));
         said.totals.count(&counters, now);
     }
 
-    fn say(&self) {
+    pub fn say(&self) {
         let status = &self.status;
         let sample = self.sample.as_ref();
         let sample = sample.filter(|sample| sample.now_us >= status.now_us);
@@ -327,11 +344,16 @@ impl Worker {
                 more: None,
             })
         });
+        let state = sample.map_or(status.state, |sample| sample.state);
+        let mut calibration = self.calibration;
+        // The newest word: under a closed clutch nothing else is asked.
+        calibration.is_calibrated &= state.hold_reason() != Some(HoldReason::NotCalibrated);
         let seen = Snapshot {
             now,
-            state: sample.map_or(status.state, |sample| sample.state),
+            state,
             clutch: self.clutch,
-            calibration: self.calibration,
+            calibration,
+            calibration_known: self.calibration_known,
             frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
             frame: None,
             angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),

@@ -3,19 +3,37 @@
 use anyhow::Result;
 use bridge::{HoldReason, State};
 
+use super::driven::Driven;
 use crate::failure::Failure;
+use crate::realtime;
+use crate::stats::seconds;
+
+/// What whoever drove knows of the run.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Driver {
+    /// Somebody could press keys.
+    pub attended: bool,
+    /// The clutch was to be closed from the start.
+    pub engages: bool,
+    /// The clutch was closed here; else the bridge was only watched.
+    pub closed: bool,
+    /// The clutch opened by itself, and nobody closed it again.
+    pub expired: bool,
+}
 
 /// How everything was when the run ended, before the clutch was opened.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ending {
     /// State of the supervisor.
     pub state: State,
-    /// Somebody could press keys.
-    pub attended: bool,
-    /// The clutch opened by itself, and nobody closed it again.
-    pub expired: bool,
+    /// What whoever drove knows.
+    pub driver: Driver,
     /// What held the gripper for the last half second.
     pub held: Option<HoldReason>,
+    /// What became of the time in which it was to follow.
+    pub driven: Driven,
+    /// The bridge's own steps came so late that samples and replies grew old in this computer.
+    pub too_busy: bool,
     /// Frames come from the glove.
     pub glove_answers: bool,
     /// They come, and none of the last half second could be used: why.
@@ -27,25 +45,27 @@ pub struct Ending {
 }
 
 impl Ending {
-    /// A run that ends with something broken has failed.
+    /// A run that ends with something broken, or in which the gripper was held instead of following, has failed.
     ///
     /// # Errors
     /// What was broken.
     pub fn judge(self) -> Result<()> {
-        match self.failure() {
+        let broken = self.broken().or_else(|| self.held_at_end());
+        match broken.or_else(|| self.held_through()) {
             Some(failure) => Err(failure.into()),
             None => Ok(()),
         }
     }
 
-    fn failure(self) -> Option<Failure> {
+    /// A device, or the clutch.
+    fn broken(&self) -> Option<Failure> {
         if matches!(self.state, State::Faulted(_)) {
             return Some(Failure::new(
                 format!("the run ended {}", self.state),
                 "`gauntlet gripper status --gripper PORT` with its port, which says what to do",
             ));
         }
-        if self.expired && !self.attended {
+        if self.driver.expired && !self.driver.attended {
             return Some(clutch_expired());
         }
         if !self.gripper_answers {
@@ -54,7 +74,7 @@ impl Ending {
                 "its cable and its 24 V supply; `gauntlet doctor --gripper PORT` with its port",
             ));
         }
-        if let Some(what) = self.disobeyed {
+        if let Some(what) = &self.disobeyed {
             return Some(Failure::new(
                 what,
                 "what holds its fingers, its emergency stop and its 24 V supply; `gauntlet gripper move --gripper PORT --to 100` \
@@ -67,43 +87,125 @@ impl Ending {
                 "its cable and power; `gauntlet doctor --glove PORT` with its port",
             ));
         }
-        if let Some(why) = self.useless {
-            return Some(Failure::new(
+        self.useless.as_ref().map(|why| {
+            Failure::new(
                 format!("the glove sends frames that cannot be used: {why}"),
                 "`gauntlet doctor --glove PORT` with its port, which names each sensor; calibrating again after it",
-            ));
+            )
+        })
+    }
+
+    /// It ended held: by the glove's fault, or by whatever it was with nobody there to mend it.
+    fn held_at_end(&self) -> Option<Failure> {
+        let reason = self.held?;
+        let counts = !self.driver.attended || mends(reason) == Mends::Glove;
+        counts.then(|| {
+            Failure::new(
+                format!("the run ended held: {reason}"),
+                self.next_step(reason),
+            )
+        })
+    }
+
+    /// It never followed although it was to, or was held for most of the time.
+    fn held_through(&self) -> Option<Failure> {
+        let driven = &self.driven;
+        if self.driver.engages && !driven.followed() {
+            return Some(match driven.reason() {
+                Some(reason) => Failure::new(
+                    format!("the gripper never followed the hand: {reason}"),
+                    self.next_step(reason),
+                ),
+                None => Failure::new(
+                    "the gripper never followed the hand: the run ended, or another host opened the clutch, before it could",
+                    "the same again",
+                ),
+            });
         }
-        held(self.held?, self.attended)
+        let reason = driven.mostly_held()?;
+        // Who was at the keys chose to wait.
+        if self.driver.attended && mends(reason).is_an_act() {
+            return None;
+        }
+        let held = driven.held_closed();
+        Some(Failure::new(
+            format!(
+                "the gripper was held for {} of the {} in which it should have followed, mostly because of this: {reason}",
+                seconds(held),
+                seconds(held + driven.moving()),
+            ),
+            self.next_step(reason),
+        ))
+    }
+
+    fn next_step(&self, reason: HoldReason) -> &'static str {
+        match mends(reason) {
+            Mends::Computer => realtime::LESS_TO_DO,
+            // What waits in a busy computer grows old there.
+            Mends::Glove | Mends::Gripper if self.too_busy && grows_old(reason) => {
+                realtime::LESS_TO_DO
+            }
+            Mends::Glove => "`gauntlet doctor --glove PORT` with its port",
+            Mends::Gripper => {
+                "its cable and its 24 V supply; `gauntlet doctor --gripper PORT` with its port"
+            }
+            Mends::Map => "a map that was trained on this hand's whole range of motion",
+            Mends::Store => {
+                "`gauntlet bridge status --bridge PORT` with its port, which says what is written and by whom"
+            }
+            Mends::Weights => "`gauntlet flash MODEL --bridge PORT` with its port",
+            Mends::Activation => "--activate: the fingers will move",
+            Mends::Calibration => {
+                "--calibrate-flat, and the hand flat and still until it says done"
+            }
+        }
     }
 }
 
-/// A run that ended held for this reason: the glove's fault, or one that nobody was there to mend.
-fn held(reason: HoldReason, attended: bool) -> Option<Failure> {
-    let glove = matches!(
-        reason,
-        HoldReason::SensorsLost(_) | HoldReason::SamplesStale
-    );
-    let next = match reason {
-        HoldReason::SensorsLost(_) | HoldReason::SamplesStale => {
-            "`gauntlet doctor --glove PORT` with its port"
-        }
-        HoldReason::NotCalibrated => {
-            "--calibrate-flat, and the hand flat and still until it says done"
-        }
-        HoldReason::NoWeights => "`gauntlet flash MODEL --bridge PORT` with its port",
-        HoldReason::GripperNotReady(_) => "--activate: the fingers will move",
-        HoldReason::InputRefused | HoldReason::OutputRefused => {
-            "a map that was trained on this hand's whole range of motion"
-        }
-        // Over by themselves, or told as something else.
-        HoldReason::HeartbeatLost
-        | HoldReason::Settling
-        | HoldReason::StoreBusy
-        | HoldReason::GripperSilent
-        | HoldReason::ClockGap => return None,
-    };
-    let counts = glove || !attended;
-    counts.then(|| Failure::new(format!("the run ended held: {reason}"), next))
+/// What a hold needs, to be over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Mends {
+    /// A computer with time for the bridge.
+    Computer,
+    /// Something at the glove.
+    Glove,
+    /// Something at the gripper.
+    Gripper,
+    /// Another map.
+    Map,
+    /// The end of what another host writes.
+    Store,
+    /// Weights in the bridge.
+    Weights,
+    /// An activation.
+    Activation,
+    /// A calibration.
+    Calibration,
+}
+
+impl Mends {
+    /// Whoever is at the keys does it, or leaves it.
+    fn is_an_act(self) -> bool {
+        matches!(self, Self::Weights | Self::Activation | Self::Calibration)
+    }
+}
+
+/// Every reason is decided here: one without a place does not compile.
+fn mends(reason: HoldReason) -> Mends {
+    match reason {
+        HoldReason::HeartbeatLost | HoldReason::Settling | HoldReason::ClockGap => Mends::Computer,
+        HoldReason::SensorsLost(_) | HoldReason::SamplesStale => Mends::Glove,
+        HoldReason::GripperSilent => Mends::Gripper,
+        HoldReason::InputRefused | HoldReason::OutputRefused => Mends::Map,
+        HoldReason::StoreBusy => Mends::Store,
+        HoldReason::NoWeights => Mends::Weights,
+        HoldReason::GripperNotReady(_) => Mends::Activation,
+        HoldReason::NotCalibrated => Mends::Calibration,
+    }
+}
+
+fn grows_old(reason: HoldReason) -> bool {
+    matches!(reason, HoldReason::SamplesStale | HoldReason::GripperSilent)
 }
 
 /// What a run is in which nobody saw that the clutch opened by itself.
@@ -113,3 +215,7 @@ fn clutch_expired() -> Failure {
         "the same on a computer that neither sleeps nor has so much to do; on a terminal, space closes the clutch again",
     )
 }
+
+#[cfg(test)]
+#[path = "ending_tests.rs"]
+mod tests;

@@ -8,13 +8,13 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use bridge::clutch::Position;
 use bridge::event::Kind;
 use bridge::protocol::message;
 use bridge::telemetry::Counters;
 use bridge::{HoldReason, State};
 
-use super::ending::Ending;
+use super::driven::{Driven, Moment};
+use super::ending::{Driver, Ending};
 use super::lasting::Lasting;
 use super::numbers::{Numbers, Progress};
 use super::record::Sort;
@@ -98,13 +98,29 @@ impl Said {
         if let Some(before) = &self.newest {
             let passed = now.now.checked_duration_since(before.now);
             let us = passed.map_or(0, |passed| passed.as_micros());
-            let closed = matches!(now.clutch, Position::Closed | Position::Lost);
-            let (time, moving) = (Duration::from_micros(us), now.state.is_moving());
-            self.numbers.pass(time, closed, moving);
+            let moment = |seen: &Snapshot| Moment {
+                clutch: seen.clutch,
+                state: seen.state,
+            };
+            let time = Duration::from_micros(us);
+            self.numbers.driven.pass(time, moment(before), moment(&now));
         }
         self.held.look(now.state.hold_reason(), now.now);
         self.useless.look(useless.then_some(()), now.now);
         self.newest = Some(now);
+    }
+
+    /// The sum of the run, at `now`.
+    fn summary(&self, now: gripper::Instant) -> Summary {
+        let summary = self.numbers.summary(now);
+        match &self.totals {
+            Totals::None => summary,
+            Totals::InProcess(counters, scheduling) => summary.with(counters, *scheduling),
+            Totals::OnChip { before, newest } => {
+                let time = newest.1.saturating_duration_since(before.1);
+                summary.on_chip(&newest.0.since(&before.0), time)
+            }
+        }
     }
 
     /// Something happened.
@@ -131,8 +147,13 @@ impl Hub {
     /// How the run goes.
     pub fn progress(&self) -> Progress {
         let mut said = self.lock();
-        let now = said.newest.map(|newest| newest.now);
-        now.map_or_else(Progress::default, |now| said.numbers.progress(now))
+        let Some(now) = said.newest.map(|newest| newest.now) else {
+            return Progress::default();
+        };
+        Progress {
+            gripper_faults: said.summary(now).gripper_faults,
+            ..said.numbers.progress(now)
+        }
     }
 
     /// What happened since `seen` events had; `seen` is how many have now. What is older than the newest 32 is gone.
@@ -147,38 +168,33 @@ impl Hub {
         said.events.iter().skip(old).cloned().collect()
     }
 
-    /// How everything is, to judge a run by that ends now: before its clutch is opened. `attended`: somebody can press keys;
-    /// `expired`: the clutch opened by itself, and nobody closed it again.
-    pub fn ending(&self, attended: bool, expired: bool) -> Option<Ending> {
+    /// How everything is, to judge a run by that ends now: before its clutch is opened.
+    pub fn ending(&self, driver: Driver) -> Option<Ending> {
         let said = self.lock();
         let seen = said.newest.as_ref()?;
+        // Who only watches is not to blame for what another host's run came to.
+        let ours = driver.closed;
         Some(Ending {
             state: seen.state,
-            attended,
-            expired,
-            held: said.held.lasted(seen.now),
+            driver,
+            held: said.held.lasted(seen.now).filter(|_| ours),
+            driven: match ours {
+                true => said.numbers.driven.clone(),
+                false => Driven::default(),
+            },
+            too_busy: said.summary(seen.now).too_busy(),
             glove_answers: seen.glove_answers,
             useless: said.useless.lasted(seen.now).map(|()| seen.why_useless()),
             gripper_answers: seen.gripper_answers,
-            disobeyed: said.numbers.obeyed.fault(),
+            disobeyed: said.numbers.obeyed.fault().filter(|_| ours),
         })
     }
 
     /// The sum of the run.
     pub fn summary(&self) -> Summary {
         let said = self.lock();
-        let Some(newest) = &said.newest else {
-            return Summary::default();
-        };
-        let summary = said.numbers.summary(newest.now);
-        match &said.totals {
-            Totals::None => summary,
-            Totals::InProcess(counters, scheduling) => summary.with(counters, *scheduling),
-            Totals::OnChip { before, newest } => {
-                let time = newest.1.saturating_duration_since(before.1);
-                summary.on_chip(&newest.0.since(&before.0), time)
-            }
-        }
+        let now = said.newest.map(|newest| newest.now);
+        now.map_or_else(Summary::default, |now| said.summary(now))
     }
 
     /// Forgets what was counted while things were brought up: the run begins now.
@@ -208,6 +224,66 @@ impl Hub {
 mod tests {
     use super::*;
     use bridge::calibration::Try;
+    use bridge::clutch::Position;
+
+    /// A run of 4 s that ends while it follows. Of each 400 ms it was held for 250 ms, until enough frames had come in a row.
+    fn held_in_pieces(totals: Totals) -> anyhow::Result<()> {
+        let hub = Hub::default();
+        hub.lock().totals = totals;
+        for ms in (0..=4_000).step_by(10) {
+            let state = match ms % 400 {
+                0..250 => State::Holding(HoldReason::Settling),
+                _ => State::Following,
+            };
+            let seen = Snapshot::at(ms, Position::Closed, state);
+            hub.lock().say(seen, false);
+        }
+        let driver = Driver {
+            engages: true,
+            closed: true,
+            ..Driver::default()
+        };
+        hub.ending(driver).unwrap().judge()
+    }
+
+    #[test]
+    fn a_run_that_was_held_for_most_of_its_time_in_pieces_has_failed_in_both_homes() {
+        let counters = message::Counters::default();
+        for totals in [
+            Totals::InProcess(Counters::default(), Scheduling::Shared),
+            Totals::on_chip(&counters, Instant::now()),
+        ] {
+            let told = held_in_pieces(totals).unwrap_err().to_string();
+            assert!(told.contains("held for 2.5 s of the 4.0 s"), "{told}");
+            assert!(told.contains("fresh frames in a row"), "{told}");
+        }
+    }
+
+    #[test]
+    fn faults_of_the_gripper_are_the_same_number_in_the_view_and_the_summary_of_both_homes() {
+        let grown = message::Counters {
+            faults: 7,
+            ..Default::default()
+        };
+        let before = message::Counters {
+            faults: 5,
+            ..Default::default()
+        };
+        let mut chip = Totals::on_chip(&before, Instant::now());
+        chip.count(&grown, Instant::now());
+        let here = Counters {
+            faults: 2,
+            ..Default::default()
+        };
+        for totals in [Totals::InProcess(here, Scheduling::Shared), chip] {
+            let hub = Hub::default();
+            hub.lock().totals = totals;
+            hub.lock()
+                .say(Snapshot::at(1, Position::Open, State::Idle), false);
+            let shown = hub.progress().gripper_faults;
+            assert_eq!((shown, hub.summary().gripper_faults), (2, 2));
+        }
+    }
 
     #[test]
     fn each_watcher_hears_every_event_once_and_of_a_flood_the_newest() {

@@ -16,6 +16,7 @@ pub mod axes;
 mod calibrating;
 mod chip_stop;
 mod chip_worker;
+mod driven;
 mod ending;
 mod hub;
 mod in_process;
@@ -23,17 +24,22 @@ mod lasting;
 mod numbers;
 mod obeyed;
 mod on_chip;
+#[cfg(test)]
+mod on_chip_tests;
 mod orders;
 pub mod record;
 pub mod replies;
+#[cfg(test)]
+mod scripted;
 pub mod slots;
 pub mod snapshot;
 pub mod stopped;
 mod summary;
 mod worker;
 
-pub use calibrating::refused;
-pub use ending::Ending;
+pub use calibrating::{kept, refused};
+pub use driven::Driven;
+pub use ending::{Driver, Ending};
 pub use hub::{Happened, Hub};
 pub use in_process::{InProcess, Parts, check_image};
 pub use numbers::Progress;

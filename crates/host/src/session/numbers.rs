@@ -7,6 +7,7 @@ use bridge::protocol::message::{Counters, Sample};
 use gripper::Instant;
 
 use super::axes::Axes;
+use super::driven::Driven;
 use super::obeyed::{MOVED_COUNTS, Obeyed};
 use super::record::{Record, Sort};
 use super::summary::Summary;
@@ -31,11 +32,9 @@ pub struct Numbers {
     frames_passed_over: u64,
     sequence_gaps: u64,
     last_sequence: Option<u32>,
-    faults: u64,
     following: bool,
-    /// Time with the clutch closed since it first followed, moving and held.
-    moving: Duration,
-    held: Duration,
+    /// What became of the time in which it was to follow.
+    pub driven: Driven,
     /// Positions when following began.
     start_positions: Option<Axes<u8>>,
     first_motion: Option<Instant>,
@@ -95,7 +94,6 @@ impl Numbers {
                     self.obeyed.stands(*axis);
                 }
                 if *sort == Sort::Fault {
-                    self.faults += 1;
                     self.last_fault = Some(text.clone());
                 }
             }
@@ -126,21 +124,10 @@ impl Numbers {
         }
     }
 
-    /// A bridge on a chip has counted so much, `grown` of it in the last `time`.
-    pub fn chip(&mut self, counters: &Counters, grown: &Counters, time: Duration) {
-        self.faults = counters.faults.into();
+    /// What a bridge on a chip counted has `grown` so much in the last `time`.
+    pub fn chip(&mut self, grown: &Counters, time: Duration) {
         let cycles = f64::from(grown.statuses) / time.as_secs_f64().max(1e-3);
         self.chip_cycles_per_s = Some(cycles);
-    }
-
-    /// `time` passed, in which the clutch was closed or not, and the gripper followed or not.
-    pub fn pass(&mut self, time: Duration, clutch: bool, moving: bool) {
-        match (clutch, moving) {
-            (true, true) => self.moving += time,
-            // What comes before it first follows is bringing up, not holding.
-            (true, false) if !self.moving.is_zero() => self.held += time,
-            _ => {}
-        }
     }
 
     fn look_for_motion(&mut self, at: Instant, position: Axes<u8>) {
@@ -162,7 +149,7 @@ impl Numbers {
         self.frames_passed_over + self.sequence_gaps
     }
 
-    /// How it goes at `now`.
+    /// How it goes at `now`; what only counters tell is left at nothing.
     pub fn progress(&mut self, now: Instant) -> Progress {
         Progress {
             frames_per_s: self.frames.now(now.as_ticks()),
@@ -172,7 +159,7 @@ impl Numbers {
             latency_p50: self.latency.at(0.5),
             latency_p99: self.latency.at(0.99),
             dropped: self.dropped(),
-            faults: self.faults,
+            gripper_faults: 0,
         }
     }
 
@@ -196,10 +183,9 @@ impl Numbers {
             latency_p50_us: self.latency.at(0.5),
             latency_p99_us: self.latency.at(0.99),
             latency_max_us: self.latency.longest(),
-            faults: self.faults,
             last_fault: self.last_fault.clone(),
-            moving_s: rounded(self.moving.as_secs_f64()),
-            held_s: rounded(self.held.as_secs_f64()),
+            moving_s: rounded(self.driven.moving().as_secs_f64()),
+            held_s: rounded(self.driven.held().as_secs_f64()),
             samples: self.samples,
             first_motion_s: self.first_motion.map(|at| rounded(self.seconds(at))),
             ..Summary::default()
@@ -220,16 +206,19 @@ pub struct Progress {
     pub latency_p99: Option<u64>,
     /// Frames that no command answered while following, and frames that never arrived.
     pub dropped: u64,
-    /// Faults so far.
-    pub faults: u64,
+    /// How often a fault of the gripper ended motion.
+    pub gripper_faults: u32,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::realtime::Scheduling;
+    use crate::session::driven::Moment;
     use crate::session::record::{AXES, Command, Frame, Imu};
+    use bridge::clutch::Position;
     use bridge::telemetry::Counters;
+    use bridge::{HoldReason, State};
     use gripper::{Activation, Contact, Fault, Motion, Status};
 
     fn at(us: u64) -> Instant {
@@ -319,14 +308,21 @@ mod tests {
     fn time_held_counts_from_the_first_following_and_with_the_clutch_closed() {
         let mut numbers = Numbers::default();
         let second = Duration::from_secs(1);
-        for (clutch, moving) in [
-            (true, false),
-            (true, true),
-            (true, false),
-            (false, false),
-            (true, true),
+        let settling = State::Holding(HoldReason::Settling);
+        let mut before = Moment {
+            clutch: Position::Closed,
+            state: settling,
+        };
+        for (clutch, state) in [
+            (Position::Closed, settling),
+            (Position::Closed, State::Following),
+            (Position::Closed, settling),
+            (Position::Open, State::Idle),
+            (Position::Closed, State::Following),
         ] {
-            numbers.pass(second, clutch, moving);
+            let now = Moment { clutch, state };
+            numbers.driven.pass(second, before, now);
+            before = now;
         }
         let summary = numbers.summary(at(0));
         assert_eq!((summary.moving_s, summary.held_s), (2.0, 1.0));
@@ -351,6 +347,8 @@ mod tests {
         assert!(!blamed(20, 3_000));
         assert!(blamed(21, 3_000));
         assert!(blamed(1, 20_000));
+        // A stop, which is told as one.
+        assert!(!blamed(1, 2_000_000));
     }
 
     #[test]
@@ -366,7 +364,7 @@ mod tests {
             .summary(at(0))
             .with(&counters, Scheduling::Shared);
         let said = summary.lines().join("\n");
-        assert!(said.contains("stood still 1 times, up to 2.0 s"), "{said}");
+        assert!(said.contains("stood still once, for up to 2.0 s"), "{said}");
     }
 
     #[test]

@@ -45,10 +45,19 @@ impl OnChip {
     ) -> Result<Self> {
         let counters = link.counters().map_err(Failure::from)?;
         let status = link.status().map_err(Failure::from)?;
+        let calibration = match link.health() {
+            // That of an older bridge, which only watches and is flashed, is not known.
+            Err(Error::Older { .. }) => None,
+            health => Some(health.map_err(Failure::from)?.calibration),
+        };
         link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
         let (orders, queue) = Orders::queue(clock);
         let hub = Hub::default();
-        let worker = Worker::new(link, queue, hub.clone(), samples, status, counters);
+        let mut worker = Worker::new(link, queue, hub.clone(), samples, status, counters);
+        if let Some(calibration) = calibration {
+            worker.knows(calibration.is_calibrated);
+        }
+        worker.say();
         let thread = std::thread::Builder::new()
             .name("bridge on a chip".to_owned())
             .spawn(move || worker.run())

@@ -94,6 +94,8 @@ pub struct Snapshot {
     pub clutch: Position,
     /// Whether the glove is calibrated, and how the newest try ended.
     pub calibration: CalibrationState,
+    /// The bridge has said so. One of an older version never does.
+    pub calibration_known: bool,
     /// Counts frames taken; 0: none yet.
     pub frame_sequence: u32,
     /// The newest frame's sensors.
@@ -140,6 +142,7 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
             state: now.state,
             clutch: now.clutch,
             calibration: now.calibration,
+            calibration_known: true,
             frame_sequence: now.frame_sequence,
             frame: now.frame,
             angles: now.angles,
@@ -161,7 +164,40 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
     }
 }
 
+#[cfg(test)]
 impl Snapshot {
+    /// Of a bridge in this process with devices that work, at `ms`.
+    pub(super) fn at(ms: u64, clutch: Position, state: State) -> Self {
+        Self {
+            now: Instant::from_ticks(1_000 * ms),
+            state,
+            clutch,
+            calibration: CalibrationState::default(),
+            calibration_known: true,
+            frame_sequence: 1,
+            frame: None,
+            angles: [0.0; JOINT_COUNT],
+            angles_valid: true,
+            distrusted: 0,
+            impossible: 0,
+            command: None,
+            sent: None,
+            status: None,
+            stands: None,
+            glove_answers: true,
+            gripper_answers: true,
+            line: Some(gripper::link::Counters::default()),
+            late_steps: 0,
+        }
+    }
+}
+
+impl Snapshot {
+    /// The glove is known not to be calibrated: nothing can follow it.
+    pub fn lacks_calibration(&self) -> bool {
+        self.calibration_known && !self.calibration.is_calibrated
+    }
+
     /// The sensors that are not used, by name, with what is wrong with them.
     pub fn unused_sensors(&self) -> Vec<String> {
         let mut unused = Vec::new();

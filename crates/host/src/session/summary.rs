@@ -8,7 +8,7 @@ use serde::Serialize;
 
 use super::replies::Failed;
 use crate::realtime::Scheduling;
-use crate::stats::{seconds, short_or_dash};
+use crate::stats::{short_or_dash, time, times};
 
 /// One late step in so many is more than a computer with time for the bridge shows.
 const LATE_ONE_IN: u64 = 50;
@@ -47,9 +47,9 @@ pub struct Summary {
     pub latency_p99_us: Option<u64>,
     /// The slowest.
     pub latency_max_us: Option<u64>,
-    /// Faults; of a chip those of the gripper that ended motion.
-    pub faults: u64,
-    /// The last of them. In this process only.
+    /// How often a fault of the gripper ended motion, until a person opened the clutch.
+    pub gripper_faults: u32,
+    /// What went wrong last, whatever it was. In this process only.
     pub last_fault: Option<String>,
     /// Of the requests to the gripper that failed, what came instead of the right answer. In this process only.
     pub gripper_failed: Option<Failed>,
@@ -90,6 +90,7 @@ impl Summary {
             late_steps: counters.late_steps,
             worst_late_us: counters.worst_late_us,
             stalls: Some(counters.stalls),
+            gripper_faults: counters.faults,
             gripper_errors: counters.gripper_errors,
             holds: counters.holds,
             scheduling: Some(scheduling),
@@ -110,7 +111,7 @@ impl Summary {
             gripper_cycles: grown.statuses.into(),
             gripper_cycles_per_s: rate(grown.statuses),
             commands: grown.commands.into(),
-            faults: grown.faults.into(),
+            gripper_faults: grown.faults,
             steps: grown.steps,
             late_steps: grown.late_steps,
             worst_late_us: grown.worst_late_us,
@@ -132,10 +133,10 @@ impl Summary {
         ];
         if self.holds > 0 {
             lines.push(format!(
-                "holds      motion was held {} times, {} in all; it followed for {}",
-                self.holds,
-                seconds(Duration::from_secs_f64(self.held_s)),
-                seconds(Duration::from_secs_f64(self.moving_s))
+                "holds      motion was held {}, {} in all; it followed for {}",
+                times(self.holds),
+                time(Duration::from_secs_f64(self.held_s)),
+                time(Duration::from_secs_f64(self.moving_s))
             ));
         }
         if let Some([host, glove, gripper]) = self.bytes_lost {
@@ -145,19 +146,17 @@ impl Summary {
         }
         if let Some(stalls) = self.stalls.filter(|stalls| *stalls > 0) {
             lines.push(format!(
-                "stalls     this program stood still {stalls} times, up to {} (suspended, stopped, or no processor free); motion was held",
-                seconds(Duration::from_micros(self.worst_late_us.into()))
+                "stalls     this program stood still {}, for up to {} (suspended, stopped, or no processor free); motion was held",
+                times(stalls),
+                time(Duration::from_micros(self.worst_late_us.into()))
             ));
         }
         if let Some(scheduling) = self.scheduling.filter(|_| self.too_busy()) {
             lines.push(format!(
-                "computer   too busy for an even motion: {} of {} steps came late, not the devices; close other programs{}",
+                "computer   too busy for an even motion: {} of {} steps came late, not the devices; {}",
                 self.late_steps,
                 self.steps,
-                match scheduling {
-                    Scheduling::Realtime => "",
-                    Scheduling::Shared => ", or allow real-time priority (docs/tool.md)",
-                }
+                scheduling.less_to_do()
             ));
         }
         lines
@@ -198,9 +197,9 @@ impl Summary {
     fn troubles(&self) -> String {
         let last = self.last_fault.as_ref();
         format!(
-            "faults     {}{}; gripper line errors {}{}, late steps {} (worst {})",
-            self.faults,
-            last.map_or_else(String::new, |fault| format!(" (last: {fault})")),
+            "faults     of the gripper {}{}; gripper line errors {}{}, late steps {} (worst {})",
+            self.gripper_faults,
+            last.map_or_else(String::new, |fault| format!(" (last trouble: {fault})")),
             self.gripper_errors,
             self.gripper_failed
                 .and_then(Failed::words)
@@ -210,10 +209,11 @@ impl Summary {
         )
     }
 
-    /// Whether the bridge's own steps came so late that samples and replies grew old in this computer.
-    fn too_busy(&self) -> bool {
+    /// Whether the bridge's own steps came so late that samples and replies grew old in this computer. A program that somebody
+    /// stopped, or a computer that slept, stood still and is not busy.
+    pub fn too_busy(&self) -> bool {
         u64::from(self.late_steps) * LATE_ONE_IN > u64::from(self.steps)
-            || self.worst_late_us >= VERY_LATE_US
+            || (self.worst_late_us >= VERY_LATE_US && self.stalls.unwrap_or(0) == 0)
     }
 }
 
@@ -239,6 +239,25 @@ mod tests {
         for name in ["stalls", "scheduling", "gripper_failed"] {
             assert!(chip[name].is_null() && !here[name].is_null(), "{name}");
         }
+    }
+
+    #[test]
+    fn a_single_hold_and_a_short_one_are_told_as_what_they_are() {
+        let told = |holds, held_s| {
+            let summary = Summary {
+                holds,
+                held_s,
+                moving_s: 12.0,
+                ..Summary::default()
+            };
+            summary.lines().join("\n")
+        };
+        let once = told(1, 0.03);
+        assert!(
+            once.contains("held once, 30.0 ms in all; it followed for 12.0 s"),
+            "{once}"
+        );
+        assert!(told(3, 2.0).contains("held 3 times, 2.0 s in all"));
     }
 
     #[test]

@@ -1,12 +1,12 @@
 //! The bridge's thread: takes the orders, hands over what happened, and ends with a hold.
 
-use bridge::calibration::Try;
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
 use bridge::{App, Board, Epoch, HoldReason, State, Telemetry};
 use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::{Activation, Instant, Status};
 
+use super::calibrating::told;
 use super::hub::{Happened, Hub, Said, Totals};
 use super::orders::{Order, Queue};
 use super::record::{Command, Feed, Frame, Imu, Record, Sort};
@@ -180,7 +180,7 @@ impl Worker {
             let record = Record::Event {
                 at: event.at,
                 sort: sort(&event.kind),
-                text: event.kind.to_string(),
+                text: told(&event.kind, &telemetry.calibration),
                 kind: event.kind,
             };
             self.tell(&mut said, record);
@@ -267,7 +267,6 @@ fn sort(kind: &Kind) -> Sort {
         | Kind::AxisStands { .. }
         | Kind::Glove { answers: false }
         | Kind::Gripper { answers: false }
-        | Kind::Calibration(Try::Refused(_))
         | Kind::NoWeights
         | Kind::Refused(_) => true,
         _ => false,

@@ -32,6 +32,7 @@ pub struct Counters {
     /// How often motion was held.
     pub holds: u32,
     /// How often the gripper's fault ended motion.
+    #[serde(rename = "gripper_faults")]
     pub faults: u32,
     /// Frames of the host protocol: whole, wrong CRC, no COBS, too long.
     pub host_frames: [u32; 4],

@@ -20,7 +20,7 @@ use trainer::optimizer::LearningRate;
 use super::train::{Schedule, deviation};
 use crate::progress::Person;
 use crate::tell::Tell;
-use crate::{out, reading};
+use crate::{out, outputs, reading};
 use host::failure::{OrFail, told};
 use host::interrupt::Interrupt;
 use host::stats::seconds;
@@ -144,6 +144,7 @@ pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
         || format!("the folder {}", options.out.display()),
         "another name in --out, in a folder where you may write",
     )?;
+    outputs::room(&options.out.join("result"))?;
     let frame = options.frame();
     let wanted = What::each(&options.what);
     let store = Store::open(options.out.join("trainings"), recording.as_ref()).map_err(told)?;

@@ -42,7 +42,7 @@ pub struct Train {
     /// Samples of the target domain, columns x0, x1, …
     #[arg(long, value_name = "X.csv", requires = "input")]
     pub target: Option<PathBuf>,
-    /// Where the trained model goes.
+    /// Where the trained model goes. A model that is there is replaced; anything else never.
     #[arg(long, value_name = "MODEL.safetensors")]
     pub out: PathBuf,
 
