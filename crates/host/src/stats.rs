@@ -3,6 +3,8 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
+use serde::Serializer;
+
 /// Buckets to an octave: a percentile is right to 1/64, 1.6 %.
 const STEPS: usize = 64;
 /// Values up to 2^24 µs, 16.8 s; anything longer counts as that.
@@ -151,6 +153,28 @@ fn ratio(events: u64, span_us: u64) -> f64 {
         return 0.0;
     }
     events as f64 / (span_us as f64 / 1e6)
+}
+
+/// For a field of a result: JSON has no NaN, and `null` would say nothing. A number that is none is a word: "NaN", "inf".
+///
+/// # Errors
+/// Those of `to`.
+pub fn number<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
+    match value.is_finite() {
+        true => to.serialize_f64(*value),
+        false => to.serialize_str(&value.to_string()),
+    }
+}
+
+/// The same for one that may not be there.
+///
+/// # Errors
+/// Those of `to`.
+pub fn number_or_null<S: Serializer>(value: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+    match value {
+        Some(value) => number(value, to),
+        None => to.serialize_none(),
+    }
 }
 
 /// A short duration as a person reads it: `3.4 ms`, `870 µs`, `1.20 s`.

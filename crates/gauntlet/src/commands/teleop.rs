@@ -1,27 +1,29 @@
 //! `gauntlet teleop`: a gripper driven by a glove, over any two serial ports.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Result;
+use clap::{Args, ValueEnum};
 use glove::hand::{SEGMENT_COUNT, Side};
 use glove::scan::Health;
 use gripper::Activation;
-use serde_json::json;
 
-use crate::cli::{Hand, Teleop};
+use crate::options::{LineOptions, model_parser, run_time};
+use crate::outputs;
 use crate::progress::Person;
+use crate::results;
 use crate::run::{LogTo, Options, Run};
 use crate::tell::Tell;
-use crate::{out, outputs};
 use host::clock::Clock;
 use host::diagnose;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
-use host::lines::list;
 use host::lines::port::BAUD;
+use host::lines::{Model, list};
+use host::next::{Command, NextStep};
 use host::probe;
-use host::session::{InProcess, Parts, Snapshot, check_image};
+use host::session::{Devices, InProcess, Parts, Snapshot, check_image};
 use host::training::model;
 use host::words;
 
@@ -30,17 +32,76 @@ const FRAME_WAIT: Duration = Duration::from_secs(15);
 /// For the others after the first that gives orientations.
 const STRAGGLERS: Duration = Duration::from_secs(2);
 
+/// Which hand wears the glove.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Hand {
+    /// The right hand.
+    Right,
+    /// The left hand.
+    Left,
+}
+
+/// Options of `teleop`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
+
+Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
+`--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \
+by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
+pub struct Teleop {
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT")]
+    pub glove: PathBuf,
+    /// The gripper's serial port, or `tcp:HOST[:PORT]`.
+    #[arg(long, value_name = "PORT")]
+    pub gripper: PathBuf,
+    /// The trained model, or a weights image.
+    #[arg(long, value_name = "MODEL|IMAGE")]
+    pub model: PathBuf,
+    /// End by itself after this many seconds (1 to 86400).
+    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
+    pub seconds: Option<Duration>,
+    /// Close the clutch from the start: the gripper follows as soon as everything is ready.
+    #[arg(long)]
+    pub engage: bool,
+    /// Activate the gripper if it is not: the fingers move.
+    #[arg(long)]
+    pub activate: bool,
+    /// Which hand wears the glove.
+    #[arg(long, value_enum, default_value_t = Hand::Right)]
+    pub hand: Hand,
+    /// Calibrate on the flat hand before the clutch may close: waits up to 30 s until it lies still for a second.
+    #[arg(long)]
+    pub calibrate_flat: bool,
+    /// How the gripper's line differs from that of a gripper as delivered.
+    #[command(flatten)]
+    pub line: LineOptions,
+    /// Which gripper it is; the map gives as many positions as it has axes.
+    #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
+    pub gripper_model: Model,
+    /// Write every frame, command and status into this session log.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub log: Option<PathBuf>,
+    /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// Runs until its time is over or somebody ends it.
 ///
 /// # Errors
 /// A failure that names the file, the port or the device.
-pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_ports(options)?;
     if options.engage && !options.calibrate_flat {
         return Err(Failure::usage(
             "--engage closes the clutch from the start, and a glove that is not calibrated does not drive",
-            "--calibrate-flat as well: it waits until the hand lies flat and still",
+            NextStep::same(Command::more().word("--calibrate-flat"))
+                .then(" as well: it waits until the hand lies flat and still"),
         )
         .into());
     }
@@ -83,7 +144,13 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         feed,
     };
     let session = InProcess::start(parts, clock, interrupt)?;
-    let mut run = Run::new(session, log, clock, interrupt.clone());
+    let devices = Devices::Here {
+        glove: options.glove.clone(),
+        gripper: options.gripper.clone(),
+        model,
+        settings: line,
+    };
+    let mut run = Run::new(session, log, clock, interrupt.clone(), devices);
     let prepared = prepare(options, &mut run, &tell, activation);
     let frames = !matches!(prepared, Ok(Prepared::NoFrames));
     let driven = match prepared {
@@ -100,11 +167,7 @@ pub(super) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     if !options.json {
         finished.tell(&tell, "");
     } else if finished.ending.is_some() {
-        out::json(&json!({
-            "gripper": finished.gripper(),
-            "run": finished.summary,
-            "log": finished.log,
-        }))?;
+        results::print("teleop", finished.result())?;
     }
     finished.judge(driven)
 }
@@ -119,7 +182,7 @@ fn check_ports(options: &Teleop) -> Result<()> {
                 "glove and gripper are on the same port, {}",
                 options.glove.display()
             ),
-            "`gauntlet ports` to tell them apart",
+            Command::gauntlet("ports").then(" to tell them apart"),
         )
         .into());
     }
@@ -191,7 +254,7 @@ fn prepare(
                 options.gripper.display(),
                 words::activation(activation)
             ),
-            "the same with --activate: the fingers will move",
+            NextStep::same(Command::more().word("--activate")).then(": the fingers will move"),
         )
         .into());
     }

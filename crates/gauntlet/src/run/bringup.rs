@@ -56,7 +56,7 @@ impl Run {
                 tell.say(format_args!("{DONE}"));
                 Ok(true)
             }
-            Some(Try::Refused(why)) => Err(refused(why).into()),
+            Some(Try::Refused(why)) => Err(refused(why, &self.devices).into()),
             _ => Err(Failure::new(
                 "the bridge did not say how the calibration ended",
                 "the same again",

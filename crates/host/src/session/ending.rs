@@ -3,7 +3,9 @@
 use anyhow::Result;
 use bridge::{HoldReason, State};
 
+use super::devices::{Devices, and};
 use crate::failure::Failure;
+use crate::next::{Command, NextStep};
 
 /// How everything was when the run ended, before the clutch was opened.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,18 +33,22 @@ impl Ending {
     ///
     /// # Errors
     /// What was broken.
-    pub fn judge(self) -> Result<()> {
-        match self.failure() {
+    pub fn judge(self, devices: &Devices) -> Result<()> {
+        match self.failure(devices) {
             Some(failure) => Err(failure.into()),
             None => Ok(()),
         }
     }
 
-    fn failure(self) -> Option<Failure> {
+    fn failure(self, devices: &Devices) -> Option<Failure> {
         if matches!(self.state, State::Faulted(_)) {
             return Some(Failure::new(
                 format!("the run ended {}", self.state),
-                "`gauntlet gripper status --gripper PORT` with its port, which says what to do",
+                and(
+                    "",
+                    devices.gripper("gripper status"),
+                    ", which says what to do",
+                ),
             ));
         }
         if self.expired && !self.attended {
@@ -51,49 +57,60 @@ impl Ending {
         if !self.gripper_answers {
             return Some(Failure::new(
                 "the gripper no longer answers",
-                "its cable and its 24 V supply; `gauntlet doctor --gripper PORT` with its port",
+                and(
+                    "its cable and its 24 V supply",
+                    devices.gripper("doctor"),
+                    "",
+                ),
             ));
         }
         if let Some(what) = self.disobeyed {
-            return Some(Failure::new(
-                what,
-                "what holds its fingers, its emergency stop and its 24 V supply; `gauntlet gripper move --gripper PORT --to 100` \
-                 with its port, which moves it without a glove",
-            ));
+            let holds = "what holds its fingers, its emergency stop and its 24 V supply";
+            let next = match devices {
+                Devices::Here { .. } => {
+                    let moved = devices.gripper("gripper move --to 100");
+                    and(holds, moved, ", which moves it without a glove")
+                }
+                Devices::Unknown | Devices::Chip(_) => and(holds, devices.gripper(""), ""),
+            };
+            return Some(Failure::new(what, next));
         }
         if !self.glove_answers {
             return Some(Failure::new(
                 "the glove no longer sends frames",
-                "its cable and power; `gauntlet doctor --glove PORT` with its port",
+                and("its cable and power", devices.glove(), ""),
             ));
         }
         if let Some(why) = self.useless {
             return Some(Failure::new(
                 format!("the glove sends frames that cannot be used: {why}"),
-                "`gauntlet doctor --glove PORT` with its port, which names each sensor; calibrating again after it",
+                and(
+                    "",
+                    devices.glove(),
+                    ", which names each sensor; calibrating again after it",
+                ),
             ));
         }
-        held(self.held?, self.attended)
+        held(self.held?, self.attended, devices)
     }
 }
 
 /// A run that ended held for this reason: the glove's fault, or one that nobody was there to mend.
-fn held(reason: HoldReason, attended: bool) -> Option<Failure> {
+fn held(reason: HoldReason, attended: bool, devices: &Devices) -> Option<Failure> {
     let glove = matches!(
         reason,
         HoldReason::SensorsLost(_) | HoldReason::SamplesStale
     );
     let next = match reason {
-        HoldReason::SensorsLost(_) | HoldReason::SamplesStale => {
-            "`gauntlet doctor --glove PORT` with its port"
+        HoldReason::SensorsLost(_) | HoldReason::SamplesStale => and("", devices.glove(), ""),
+        HoldReason::NotCalibrated => NextStep::same(Command::more().word("--calibrate-flat"))
+            .then(", and the hand flat and still until it says done"),
+        HoldReason::NoWeights => and("", devices.bridge("flash MODEL"), " with a trained model"),
+        HoldReason::GripperNotReady(_) => {
+            NextStep::same(Command::more().word("--activate")).then(": the fingers will move")
         }
-        HoldReason::NotCalibrated => {
-            "--calibrate-flat, and the hand flat and still until it says done"
-        }
-        HoldReason::NoWeights => "`gauntlet flash MODEL --bridge PORT` with its port",
-        HoldReason::GripperNotReady(_) => "--activate: the fingers will move",
         HoldReason::InputRefused | HoldReason::OutputRefused => {
-            "a map that was trained on this hand's whole range of motion"
+            "a map that was trained on this hand's whole range of motion".into()
         }
         // Over by themselves, or told as something else.
         HoldReason::HeartbeatLost

@@ -16,6 +16,7 @@ pub mod axes;
 mod calibrating;
 mod chip_stop;
 mod chip_worker;
+mod devices;
 mod ending;
 mod hub;
 mod in_process;
@@ -33,6 +34,7 @@ mod summary;
 mod worker;
 
 pub use calibrating::refused;
+pub use devices::Devices;
 pub use ending::Ending;
 pub use hub::{Happened, Hub};
 pub use in_process::{InProcess, Parts, check_image};

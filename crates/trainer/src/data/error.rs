@@ -2,12 +2,14 @@
 
 use std::path::PathBuf;
 
+use crate::remedy::Remedy;
+
 /// What can be wrong with a file of samples. Rows are counted from 1 without the header; the line of the file comes with them.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be opened or read.
     #[error(
-        "cannot read {}: {source}; check the path and that you may read it", file.display()
+        "cannot read {}: {source}", file.display()
     )]
     Read {
         /// The file.
@@ -17,7 +19,7 @@ pub enum Error {
     },
     /// The file cannot be written.
     #[error(
-        "cannot write {}: {source}; check that the folder exists and that you may write there", file.display()
+        "cannot write {}: {source}", file.display()
     )]
     Write {
         /// The file.
@@ -27,7 +29,7 @@ pub enum Error {
     },
     /// Not text, or the quotes do not close.
     #[error(
-        "{}, line {line}: not CSV text ({what}); save it as comma-separated UTF-8 text with one header line", file.display()
+        "{}, line {line}: not CSV text ({what})", file.display()
     )]
     NotCsv {
         /// The file.
@@ -38,7 +40,7 @@ pub enum Error {
         what: String,
     },
     /// Another encoding than UTF-8, or no text.
-    #[error("{} is {what}, not UTF-8 text; {next}", file.display())]
+    #[error("{} is {what}, not UTF-8 text", file.display())]
     Encoding {
         /// The file.
         file: PathBuf,
@@ -49,7 +51,7 @@ pub enum Error {
     },
     /// Numbers where the header should be.
     #[error(
-        "{}, line {line}: {fields} fields, numbers: the header is missing; put a line with the columns' names above", file.display()
+        "{}, line {line}: {fields} fields, numbers: the header is missing", file.display()
     )]
     NoHeader {
         /// The file.
@@ -61,7 +63,7 @@ pub enum Error {
     },
     /// Commas between the fields and within the numbers.
     #[error(
-        "{}, line {line} (row {row}): {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields; save it with semicolons between the fields, or with decimal points", file.display()
+        "{}, line {line} (row {row}): {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields", file.display()
     )]
     BothCommas {
         /// The file.
@@ -77,7 +79,7 @@ pub enum Error {
     },
     /// A decimal point in a file with decimal commas.
     #[error(
-        "{}, line {line} (row {row}), column `{column}`: `{value}` has a point, others have decimal commas; save the file with one of them, without marks between thousands", file.display()
+        "{}, line {line} (row {row}), column `{column}`: `{value}` has a point, others have decimal commas", file.display()
     )]
     TwoMarks {
         /// The file.
@@ -93,7 +95,7 @@ pub enum Error {
     },
     /// No header line.
     #[error(
-        "{} is empty; it needs a header line that names the columns, then one line a sample", file.display()
+        "{} is empty", file.display()
     )]
     Empty {
         /// The file.
@@ -101,7 +103,7 @@ pub enum Error {
     },
     /// A column that is needed is not in the header.
     #[error(
-        "{}: column `{column}` is missing ({}); add it to the header line and to every row", file.display(), Named(found)
+        "{}: column `{column}` is missing ({})", file.display(), Named(found)
     )]
     MissingColumn {
         /// The file.
@@ -113,7 +115,7 @@ pub enum Error {
     },
     /// A column is in the header twice.
     #[error(
-        "{}: column `{column}` is in the header twice; remove or rename one of them", file.display()
+        "{}: column `{column}` is in the header twice", file.display()
     )]
     DuplicateColumn {
         /// The file.
@@ -123,7 +125,7 @@ pub enum Error {
     },
     /// A row has more or fewer fields than the header.
     #[error(
-        "{}, line {line} (row {row}): {found} fields, the header has {expected}; complete or remove this row", file.display()
+        "{}, line {line} (row {row}): {found} fields, the header has {expected}", file.display()
     )]
     Ragged {
         /// The file.
@@ -139,7 +141,7 @@ pub enum Error {
     },
     /// A field is not a number.
     #[error(
-        "{}, line {line} (row {row}), column `{column}`: `{value}` is not a number; write it like 0.25, or remove this row", file.display()
+        "{}, line {line} (row {row}), column `{column}`: `{value}` is not a number", file.display()
     )]
     NotNumeric {
         /// The file.
@@ -155,7 +157,7 @@ pub enum Error {
     },
     /// A field is NaN, infinite, or too large for a 32-bit number.
     #[error(
-        "{}, line {line} (row {row}), column `{column}`: {value} is not a finite value; remove this row or fill the gap", file.display()
+        "{}, line {line} (row {row}), column `{column}`: {value} is not a finite value", file.display()
     )]
     NotFinite {
         /// The file.
@@ -190,7 +192,7 @@ pub enum Error {
     },
     /// A unit that no angle has.
     #[error(
-        "{}: column `{column}` is in `{unit}`, which is no unit of angles; give radians ([rad]) or degrees ([deg])", file.display()
+        "{}: column `{column}` is in `{unit}`, which is no unit of angles", file.display()
     )]
     Unit {
         /// The file.
@@ -202,7 +204,7 @@ pub enum Error {
     },
     /// Angles of two units.
     #[error(
-        "{}: column `{column}` is not said to be in {others}, as others are; write one unit for all angles", file.display()
+        "{}: column `{column}` is not said to be in {others}, as others are", file.display()
     )]
     MixedUnits {
         /// The file.
@@ -214,7 +216,7 @@ pub enum Error {
     },
     /// Times do not grow.
     #[error(
-        "{}, line {line} (row {row}), column `{column}`: {time_s} does not come after {before}; a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order", file.display()
+        "{}, line {line} (row {row}), column `{column}`: {time_s} does not come after {before}", file.display()
     )]
     TimeNotIncreasing {
         /// The file.
@@ -232,7 +234,7 @@ pub enum Error {
     },
     /// Fewer rows than the work at hand needs.
     #[error(
-        "{}: {found} rows, at least {needed} are needed; record more samples", file.display()
+        "{}: {found} rows, at least {needed} are needed", file.display()
     )]
     TooFewRows {
         /// The file.
@@ -242,6 +244,32 @@ pub enum Error {
         /// Rows needed.
         needed: usize,
     },
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::Read { .. } => "check the path and that you may read it".to_owned(),
+            Self::Write { .. } => "check that the folder exists and that you may write there".to_owned(),
+            Self::NotCsv { .. } => "save it as comma-separated UTF-8 text with one header line".to_owned(),
+            Self::Encoding { next, .. } => next.clone(),
+            Self::NoHeader { .. } => "put a line with the columns' names above".to_owned(),
+            Self::BothCommas { .. } => "save it with semicolons between the fields, or with decimal points".to_owned(),
+            Self::TwoMarks { .. } => "save the file with one of them, without marks between thousands".to_owned(),
+            Self::Empty { .. } => "it needs a header line that names the columns, then one line a sample".to_owned(),
+            Self::MissingColumn { .. } => "add it to the header line and to every row".to_owned(),
+            Self::DuplicateColumn { .. } => "remove or rename one of them".to_owned(),
+            Self::Ragged { .. } => "complete or remove this row".to_owned(),
+            Self::NotNumeric { .. } => "write it like 0.25, or remove this row".to_owned(),
+            Self::NotFinite { .. } => "remove this row or fill the gap".to_owned(),
+            Self::BeyondTurn { degrees: true, .. } => "repair or remove this row".to_owned(),
+            Self::BeyondTurn { .. } => "take full turns away where a sensor counted on, or say in the header that angles are in degrees (`index_mcp_flex [deg]`)".to_owned(),
+            Self::Unit { .. } => "give radians ([rad]) or degrees ([deg])".to_owned(),
+            Self::MixedUnits { .. } => "write one unit for all angles".to_owned(),
+            Self::TimeNotIncreasing { .. } => "a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order".to_owned(),
+            Self::TooFewRows { .. } => "record more samples".to_owned(),
+        }
+    }
 }
 
 /// A header as a person reads it in an error: the first names and how many more.

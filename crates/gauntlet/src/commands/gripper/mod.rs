@@ -24,28 +24,17 @@ use crate::tell::Tell;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::lines::Line;
+use host::next::{Command, advice};
 
-pub use args::{Grasp, Gripper, Mode, Move, Release, Target, Verb, Watch, model_parser};
+pub use args::{Grasp, Gripper, Mode, Move, Release, Target, Verb, Watch};
 pub(super) use bench::{Bench, Waiter};
 pub use host::lines::Model;
-
-impl Verb {
-    fn target(&self) -> &Target {
-        match self {
-            Self::Status(target) | Self::Activate(target) | Self::Reset(target) => target,
-            Self::Move(options) => &options.target,
-            Self::Mode(options) => &options.target,
-            Self::Release(options) => &options.target,
-            Self::Watch(options) => &options.target,
-        }
-    }
-}
 
 /// Runs one verb; every one ends within a deadline.
 ///
 /// # Errors
 /// A failure that says why it did not happen and what to do.
-pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
     let target = options.verb.target();
     let is_tcp = host::lines::tcp::Address::parse(&target.gripper)?.is_some();
     if is_tcp && target.model != Model::ThreeFinger {
@@ -85,6 +74,8 @@ fn first_status<B: Bench<X>, const X: usize>(
 struct Doing<'a, B> {
     driver: B,
     target: &'a Target,
+    /// What was asked for, as it is typed.
+    verb: &'static str,
     waiter: Waiter,
     tell: Tell,
 }
@@ -102,6 +93,7 @@ fn act<B: Bench<X>, const X: usize>(
     let mut doing = Doing {
         driver,
         target,
+        verb: options.verb.name(),
         waiter,
         tell,
     };
@@ -179,11 +171,10 @@ fn no_answer<B: Bench<X>, const X: usize>(
             config.unit
         );
         let next = match error {
-            host::lines::tcp::Error::Timeout => format!(
-                "{}; ending other programs that are connected to it; another --unit (2 by default); the gripper's power",
-                target.patient_for("status", host::lines::MOST_PATIENCE)
-            ),
-            error => error.next_step().to_owned(),
+            host::lines::tcp::Error::Timeout => target
+                .patient_for("status", host::lines::MOST_PATIENCE)
+                .then("; ending other programs that are connected to it; another --unit (2 by default); the gripper's power"),
+            error => error.next_step().into(),
         };
         return Failure::new(what, next).into();
     }
@@ -194,10 +185,11 @@ fn no_answer<B: Bench<X>, const X: usize>(
                 "a gripper answers on {place} as unit {}, but late: up to {late} ms after it was asked",
                 config.unit
             ),
-            format!(
-                "{}, which waits longer; the adapter's latency timer (`gauntlet ports`), or the tunnel that keeps its bytes back",
-                target.patient_for("status", Duration::from_millis(late))
-            ),
+            target
+                .patient_for("status", Duration::from_millis(late))
+                .then(", which waits longer; the adapter's latency timer (")
+                .then(Command::gauntlet("ports"))
+                .then("), or the tunnel that keeps its bytes back"),
         )
         .into();
     }
@@ -207,10 +199,8 @@ fn no_answer<B: Bench<X>, const X: usize>(
                 "no {name} answers on {place} as unit {}: {error}",
                 config.unit
             ),
-            format!(
-                "an adapter with bias resistors and 120 ohms at both ends of the bus, then {}",
-                target.again("status")
-            ),
+            advice("an adapter with bias resistors and 120 ohms at both ends of the bus, then ")
+                .then(target.again("status")),
         )
         .into();
     }
@@ -234,7 +224,7 @@ fn no_answer<B: Bench<X>, const X: usize>(
             "no {name} answers on {place} as unit {} at {} baud{why}",
             config.unit, config.baud
         ),
-        format!("{}, which finds out which layer fails", target.doctor()),
+        target.doctor().then(", which finds out which layer fails"),
     )
     .into()
 }
@@ -246,10 +236,6 @@ impl<B> Doing<'_, B> {
         B: Bench<X>,
     {
         task::finish(&self.waiter, &mut self.driver, self.target)
-    }
-
-    fn place(&self) -> String {
-        self.target.gripper.display().to_string()
     }
 
     fn activate<const X: usize>(&mut self, status: &Status<X>) -> Result<()>

@@ -6,6 +6,7 @@ use gripper::{Activation, Fault, Instant, Status};
 use super::args::Target;
 use super::leader::{Leader, since};
 use host::failure::Failure;
+use host::next::advice;
 
 impl<const X: usize> Leader<'_, X> {
     pub(super) fn implausible(&self, status: &Status<X>, axis: usize) -> Failure {
@@ -46,10 +47,9 @@ impl<const X: usize> Leader<'_, X> {
     fn doubt(&self, what: String) -> Failure {
         Failure::new(
             what,
-            format!(
-                "looking at the gripper, then {}: a worn position sensor, or two devices that answer as one unit",
-                self.options.target.again("watch --raw")
-            ),
+            advice("looking at the gripper, then ")
+                .then(self.options.target.again("watch --raw"))
+                .then(": a worn position sensor, or two devices that answer as one unit"),
         )
     }
 
@@ -59,10 +59,8 @@ impl<const X: usize> Leader<'_, X> {
             format!(
                 "{name} stands at {here} although told to move to {there}, and touches nothing as far as the gripper says"
             ),
-            format!(
-                "looking at what keeps it from moving and at its 24 V supply, then {}",
-                self.options.target.again("status")
-            ),
+            advice("looking at what keeps it from moving and at its 24 V supply, then ")
+                .then(self.options.target.again("status")),
         )
     }
 
@@ -83,10 +81,8 @@ impl<const X: usize> Leader<'_, X> {
         };
         Failure::new(
             what,
-            format!(
-                "ending other programs and gateways that write to it, then {}",
-                self.options.target.again("status --raw")
-            ),
+            advice("ending other programs and gateways that write to it, then ")
+                .then(self.options.target.again("status --raw")),
         )
     }
 
@@ -110,15 +106,16 @@ pub(super) fn may_move<const X: usize>(status: &Status<X>, target: &Target) -> R
     if status.fault != Fault::None {
         let next = match (status.fault, status.activation) {
             // It is activated: only a new start clears that.
-            (Fault::ActivationNeeded | Fault::NotActivated, Activation::Ready) => format!(
-                "{}, then {}: the gripper lets go, then its fingers move",
-                target.again("reset"),
-                target.again("activate")
-            ),
-            (Fault::ActivationNeeded | Fault::NotActivated, _) => {
-                format!("{}: {}", target.again("activate"), status.fault.action())
-            }
-            _ => status.fault.action().to_owned(),
+            (Fault::ActivationNeeded | Fault::NotActivated, Activation::Ready) => target
+                .again("reset")
+                .then(", then ")
+                .then(target.again("activate"))
+                .then(": the gripper lets go, then its fingers move"),
+            (Fault::ActivationNeeded | Fault::NotActivated, _) => target
+                .again("activate")
+                .then(": ")
+                .then(status.fault.action()),
+            _ => target.cure(status.fault),
         };
         let (code, sentence) = (status.fault.code(), status.fault.sentence());
         // The sentence ends the thought; what follows it here goes on.
@@ -136,10 +133,9 @@ pub(super) fn may_move<const X: usize>(status: &Status<X>, target: &Target) -> R
         Activation::Ready => Ok(()),
         Activation::Reset => Err(Failure::new(
             "it cannot move: the gripper is not activated",
-            format!(
-                "{}: the fingers move through their whole range",
-                target.again("activate")
-            ),
+            target
+                .again("activate")
+                .then(": the fingers move through their whole range"),
         )),
         Activation::Activating | Activation::ChangingMode => Err(Failure::new(
             "it cannot move: the gripper is busy activating or changing its mode",

@@ -7,7 +7,6 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use serde_json::{Value, json};
 use trainer::hand::Space;
 use trainer::hand::table3::POSES;
 use trainer::model::Model;
@@ -18,10 +17,12 @@ pub use args::{CoverageArgs, Schedule, Train};
 
 use crate::outputs::Kind;
 use crate::progress::Person;
+use crate::results::{self, maps};
 use crate::tell::Tell;
-use crate::{out, outputs, reading};
+use crate::{note, outputs, reading};
 use host::failure::{Failure, told};
 use host::interrupt::Interrupt;
+use host::next::{Command, NextStep};
 use host::stats::seconds;
 use host::training::motion::Motion;
 use host::training::quality::{Measured, Quality};
@@ -31,7 +32,7 @@ use host::training::{Course, Ended, Task, domains, hand};
 ///
 /// # Errors
 /// A failure that names the file and what is wrong with it.
-pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     check_outputs(options)?;
     let mut task = reading::ended_by(interrupt, "what is to be trained on", || {
@@ -54,24 +55,24 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let quality = Quality::from_measured(&measured, space(options));
     let unfit = if is_hand { unfit(&quality) } else { None };
     for warning in far_from_truth(&measured).into_iter().chain(unfit) {
-        out::note(format_args!("warning: {warning}"));
+        note!("warning: {warning}");
         learned.warnings.push(warning);
     }
     if options.json {
-        let mut result = json!({
-            "model": options.out,
-            "epochs": learned.trained.epochs,
-            "pairs": learned.trained.pairs.inputs.rows,
-            "seed": options.seed,
-            "training_s": learned.took.as_secs_f64(),
-            "warnings": learned.warnings,
-            "quality": measured,
-        });
-        if is_hand {
-            result["quality"] = json!(quality);
-            result["good"] = json!(quality.good());
-        }
-        return out::json(&result);
+        let trained = maps::Trained {
+            model: &options.out,
+            epochs: learned.trained.epochs,
+            pairs: learned.trained.pairs.inputs.rows,
+            seed: options.seed,
+            training_s: learned.took.as_secs_f64(),
+            warnings: &learned.warnings,
+            quality: match is_hand {
+                true => maps::Measures::Hand(&quality),
+                false => maps::Measures::Domains(&measured),
+            },
+            good: is_hand.then(|| quality.good()),
+        };
+        return results::print("train", trained);
     }
     tell.say(format_args!("trained    in {}", seconds(learned.took)));
     let lines = if is_hand {
@@ -124,8 +125,7 @@ fn save(model: &Model, options: &Train) -> Result<()> {
     let Err(error) = model.save(&options.out) else {
         return Ok(());
     };
-    let error = error.to_string();
-    let what = error.rsplit_once("; ").map_or(&error[..], |(what, _)| what);
+    let what = error.to_string();
     let name = format!("gauntlet-{}.safetensors", std::process::id());
     let other = std::env::temp_dir().join(name);
     let written = OpenOptions::new()
@@ -136,7 +136,11 @@ fn save(model: &Model, options: &Train) -> Result<()> {
     Err(match written {
         Ok(()) => Failure::new(
             format!("{what}; the finished model is in {}", other.display()),
-            format!("mv '{}' '{}'", other.display(), options.out.display()),
+            NextStep::from(
+                Command::program("mv")
+                    .word(other.display().to_string())
+                    .word(options.out.display().to_string()),
+            ),
         ),
         Err(_) => Failure::new(what, "a folder with room that you may write in"),
     }
@@ -149,16 +153,13 @@ fn unmeasured(options: &Train) -> anyhow::Error {
     let what = format!(
         "interrupted while the map was measured: the model is whole in {out}, without its measures"
     );
+    let eval = Command::gauntlet("eval").path("--model", &options.out);
     let next = match (&options.poses, &options.input, &options.target) {
-        (None, Some(input), Some(target)) => format!(
-            "gauntlet eval --model {out} --input {} --target {}",
-            input.display(),
-            target.display()
-        ),
-        (poses, ..) => format!(
-            "gauntlet eval --model {out} --poses {}",
-            poses.as_deref().unwrap_or(Path::new("FILE.csv")).display()
-        ),
+        (None, Some(input), Some(target)) => eval.path("--input", input).path("--target", target),
+        (poses, ..) => {
+            let poses = poses.as_deref().unwrap_or(Path::new("FILE.csv"));
+            eval.path("--poses", poses)
+        }
     };
     Failure::new(what, next).into()
 }
@@ -280,16 +281,20 @@ fn describe(options: &Train, task: &Task, course: &Course, tell: &Tell) {
 fn stopped(options: &Train, epoch: usize, tell: &Tell) -> Result<()> {
     let file = options.checkpoint.as_deref().unwrap_or(Path::new("?"));
     if options.json {
-        return out::json(&json!({
-            "model": Value::Null,
-            "stopped_at_epoch": epoch,
-            "checkpoint": file,
-        }));
+        let paused = maps::Paused {
+            model: None,
+            stopped_at_epoch: epoch,
+            checkpoint: file,
+        };
+        return results::print("train", paused);
     }
+    let next = NextStep::same(Command::more().path("--resume", file));
+    let typed = Command::again(&crate::options::typed(), &["--stop-at"]);
     tell.say(format_args!(
-        "stopped    at epoch {epoch}; the state is in {}: the same command with --resume {} instead of --stop-at goes on",
+        "stopped    at epoch {epoch}; the state is in {}: the same command with --resume instead of --stop-at goes on, \
+         {}",
         file.display(),
-        file.display()
+        next.typed(typed.words())
     ));
     Ok(())
 }

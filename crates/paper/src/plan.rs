@@ -1,14 +1,12 @@
 //! The tables and figures by name, and the trainings that each of them needs.
 
-use clap::ValueEnum;
-use paper::shapes::ShapePair;
-use paper::{Cell, Row, Source, Table};
+use crate::shapes::ShapePair;
+use crate::{Cell, Row, Source, Table};
 use trainer::algorithm::Schedule;
 use trainer::network::Initialisation;
 
 /// A table or a figure of the paper. Figures 7 and 8 show a hand's bones and the hardware: nothing to compute.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs, reason = "the help text says it")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum What {
     /// Everything below.
     All,
@@ -53,16 +51,86 @@ pub enum What {
 }
 
 impl What {
-    /// For file names.
-    pub fn name(self) -> String {
-        self.to_possible_value()
-            .map_or_else(String::new, |value| value.get_name().to_owned())
+    /// All of them in the paper's order, [`What::All`] first.
+    pub const EVERY: [Self; 20] = [
+        Self::All,
+        Self::Table2,
+        Self::Table4,
+        Self::Fig1,
+        Self::Fig2,
+        Self::Fig3,
+        Self::Fig4,
+        Self::Fig5,
+        Self::Fig6,
+        Self::Fig9,
+        Self::Fig10,
+        Self::Fig11,
+        Self::Fig12,
+        Self::Fig13,
+        Self::Fig14,
+        Self::Fig15,
+        Self::Fig16,
+        Self::Fig17,
+        Self::Fig18,
+        Self::Fig19,
+    ];
+
+    /// As it is typed, and for file names.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::All => "all",
+            Self::Table2 => "table2",
+            Self::Table4 => "table4",
+            Self::Fig1 => "fig1",
+            Self::Fig2 => "fig2",
+            Self::Fig3 => "fig3",
+            Self::Fig4 => "fig4",
+            Self::Fig5 => "fig5",
+            Self::Fig6 => "fig6",
+            Self::Fig9 => "fig9",
+            Self::Fig10 => "fig10",
+            Self::Fig11 => "fig11",
+            Self::Fig12 => "fig12",
+            Self::Fig13 => "fig13",
+            Self::Fig14 => "fig14",
+            Self::Fig15 => "fig15",
+            Self::Fig16 => "fig16",
+            Self::Fig17 => "fig17",
+            Self::Fig18 => "fig18",
+            Self::Fig19 => "fig19",
+        }
+    }
+
+    /// What it shows.
+    pub const fn about(self) -> &'static str {
+        match self {
+            Self::All => "Everything below",
+            Self::Table2 => "The seven costs on SP1 to SP4, four pairs, with the t-tests of §3.2.3",
+            Self::Table4 => "The seven costs on a hand, eight pairs",
+            Self::Fig1 => "The four pairs of shapes with ten matched points",
+            Self::Fig2 => "The measures over the epochs, SP1",
+            Self::Fig3 => "The map at the end of each session, SP1 to SP4",
+            Self::Fig4 => "Volume occupancy over the number of pairs, SP1",
+            Self::Fig5 => "NMSE over the number of pairs, SP1",
+            Self::Fig6 => "A fold and a twist, coloured by each point's d-Knn",
+            Self::Fig9 => "The pairs that were chosen, as hand and gripper",
+            Self::Fig10 => "The measures over the number of pairs, hand",
+            Self::Fig11 => "The measures over the epochs, hand",
+            Self::Fig12 => "Six seconds of motion, as hand and gripper",
+            Self::Fig13 => "Hand poses and gripper poses along their principal axes",
+            Self::Fig14 => "Distortion over the epochs, SP2 to SP4",
+            Self::Fig15 => "Volume occupancy over the epochs, SP2 to SP4",
+            Self::Fig16 => "d-Knn over the epochs, SP2 to SP4",
+            Self::Fig17 => "NMSE over the epochs, SP2 to SP4",
+            Self::Fig18 => "Volume occupancy over the number of pairs, SP2 to SP4",
+            Self::Fig19 => "NMSE over the number of pairs, SP2 to SP4",
+        }
     }
 
     /// `all` taken apart, doubles left out, in the paper's order.
     pub fn each(wanted: &[Self]) -> Vec<Self> {
         let all = wanted.contains(&Self::All);
-        let each = Self::value_variants().iter().copied();
+        let each = Self::EVERY.into_iter();
         each.filter(|what| *what != Self::All && (all || wanted.contains(what)))
             .collect()
     }
