@@ -8,7 +8,7 @@ use anyhow::Result;
 use bridge::calibration::{Refusal, Try};
 use bridge::protocol::message::{Health, Sample};
 
-use super::BridgeAt;
+use super::args::BridgeAt;
 use super::poses::Poses;
 use crate::results::{self, devices, runs};
 use crate::run::{Finished, Options, Run};

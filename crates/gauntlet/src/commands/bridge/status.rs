@@ -5,7 +5,7 @@ use bridge::calibration::Try;
 use bridge::protocol::message::{Health, Restart, Status};
 use gripper::{Activation, Fault};
 
-use super::BridgeAt;
+use super::args::BridgeAt;
 use crate::commands::flash::slot_lines;
 use crate::results::{self, devices};
 use crate::tell::Tell;

@@ -6,7 +6,7 @@ use anyhow::Result;
 use glove::hand::Side;
 use rig::pty::Handle;
 
-use super::Demo;
+use super::args::Demo;
 use super::parts::{self, Started};
 use crate::progress::Person;
 use crate::run::{LogTo, Run};

@@ -5,7 +5,7 @@ use std::time::Duration;
 use anyhow::Result;
 use rig::pty::Handle;
 
-use super::Demo;
+use super::args::Demo;
 use super::parts::{self, Started};
 use crate::commands::{bridge, flash};
 use crate::tell::Tell;

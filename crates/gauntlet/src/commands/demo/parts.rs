@@ -11,7 +11,7 @@ use rig::pty::{Handle, PtyDevice};
 use trainer::algorithm::Schedule;
 use trainer::hand::Space;
 
-use super::Demo;
+use super::args::Demo;
 use crate::commands::simulate;
 use crate::played;
 use crate::progress::Person;

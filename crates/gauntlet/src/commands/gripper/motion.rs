@@ -10,12 +10,13 @@ use std::time::Duration;
 use anyhow::Result;
 use gripper::{Activation, Fault, Status, space};
 
+use super::allowed::may_move;
+use super::args::Move;
 use super::args::Target;
 use super::axes::Axes;
 use super::bench::Bench;
+use super::doing::Doing;
 use super::leader::{End, LEAD, Leader, SILENCE};
-use super::refusal::may_move;
-use super::{Doing, Move};
 use crate::note;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Suspend;

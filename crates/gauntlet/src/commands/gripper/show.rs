@@ -8,7 +8,8 @@ use gripper::travel::{DOUBTS, Plausibility, Verdict};
 use gripper::{Activation, Fault, Status};
 
 use super::bench::Bench;
-use super::{Doing, is_refusing, table};
+use super::doing::{Doing, is_refusing};
+use super::table;
 use crate::results::{self, devices};
 use crate::say;
 use host::failure::Failure;
