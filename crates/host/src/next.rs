@@ -147,6 +147,8 @@ impl NextStep {
                 let valued = more.windows(2).filter(|pair| !pair[1].starts_with("--"));
                 let replaced: Vec<&str> = valued.map(|pair| pair[0].as_str()).collect();
                 let mut command = Command::again(words, &replaced);
+                // What is there already is not said twice.
+                more.retain(|word| !word.starts_with("--") || !command.words.contains(word));
                 command.words.append(more);
                 *part = Part::Command(command);
             }
@@ -264,6 +266,12 @@ mod tests {
         assert_eq!(
             step.typed(&typed).to_string(),
             "it goes on: `gauntlet train --out 'a b' --resume a.checkpoint`"
+        );
+        let flag = NextStep::same(Command::more().word("--activate"));
+        let typed = ["gauntlet", "teleop", "--activate"].map(str::to_owned);
+        assert_eq!(
+            flag.typed(&typed).to_string(),
+            "`gauntlet teleop --activate`"
         );
     }
 

@@ -76,9 +76,12 @@ pub struct Reproduce {
 }
 
 fn what() -> impl TypedValueParser<Value = What> {
-    let names = What::EVERY.map(|what| PossibleValue::new(what.name()).help(what.about()));
-    let of = |name: String| What::EVERY.into_iter().find(|what| what.name() == name);
-    PossibleValuesParser::new(names).try_map(move |name| of(name).ok_or("no table or figure"))
+    let names = What::EVERY.map(|(_, name, about)| PossibleValue::new(name).help(about));
+    PossibleValuesParser::new(names).try_map(|typed| {
+        let mut every = What::EVERY.into_iter();
+        let found = every.find(|(_, name, _)| *name == typed);
+        found.map(|(what, ..)| what).ok_or("no table or figure")
+    })
 }
 
 /// Trainings of seconds: maps take shape, not more.
