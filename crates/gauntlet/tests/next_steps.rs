@@ -187,6 +187,30 @@ fn every_fault_that_needs_a_reset_comes_with_the_commands_for_this_gripper() {
     }
 }
 
+#[test]
+fn a_failure_is_a_result_with_the_next_step_as_data() {
+    let port = "/dev/there is none";
+    let output = std::process::Command::new(env!("CARGO_BIN_EXE_gauntlet"))
+        .args(["gripper", "status", "--json", "--gripper", port])
+        .output()
+        .unwrap();
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(said["result"], "failure");
+    assert_eq!(
+        (&said["version"], &said["exit_code"]),
+        (&1.into(), &1.into())
+    );
+    assert!(said["error"].as_str().unwrap().contains(port), "{said}");
+    assert_eq!(
+        said["commands"][0],
+        serde_json::json!(["gauntlet", "ports"])
+    );
+    let stderr = String::from_utf8_lossy(&output.stderr);
+    let step = said["try"].as_str().unwrap();
+    assert!(stderr.contains(&format!("try: {step}")), "{stderr}");
+}
+
 /// A command in a text would be one that nobody looks at.
 #[test]
 fn no_command_of_this_tool_stands_in_a_text() {

@@ -213,6 +213,7 @@ fn results_of_maps_keep_their_names() {
         model: None,
         stopped_at_epoch: 100,
         checkpoint: path("half.checkpoint"),
+        next: Command::gauntlet("train").into(),
     };
     let evaluated = maps::Evaluated {
         model: path("map.safetensors"),

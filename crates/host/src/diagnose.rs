@@ -4,6 +4,7 @@
 //! reads them does.
 
 mod answer;
+mod cure;
 mod glove;
 mod gripper;
 mod network;
@@ -14,8 +15,9 @@ mod serial;
 
 use serde::Serialize;
 
+pub use cure::cure;
 pub use glove::{glove, keeps_registers, missing_sensors, no_glove, no_sensors};
-pub use gripper::{cure, gripper, no_gripper};
+pub use gripper::{gripper, no_gripper};
 pub use place::{Asked, Place};
 
 use crate::failure::Failure;

@@ -6,6 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use host::chip::link::Flashed;
+use host::next::NextStep;
 use host::training::model::Int16;
 use host::training::quality::{Measured, Quality};
 
@@ -49,6 +50,9 @@ pub struct Paused<'a> {
     pub stopped_at_epoch: usize,
     /// Where the state is.
     pub checkpoint: &'a Path,
+    /// How it goes on.
+    #[serde(flatten)]
+    pub next: NextStep,
 }
 
 /// `eval`.

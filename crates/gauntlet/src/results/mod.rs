@@ -55,11 +55,10 @@ pub fn print(verb: &'static str, value: impl Serialize) -> Result<()> {
 
 /// A result of `verb` in one line: one of many. Empty for a value that has no JSON form; none of this tool's.
 pub fn line(verb: &'static str, value: impl Serialize) -> String {
-    PRINTED.store(true, Ordering::Relaxed);
     serde_json::to_string(&named(verb, value)).unwrap_or_default()
 }
 
-/// Prints why there is no result, where none was printed.
+/// Prints why there is no result, where none was printed; in one line, as one of many.
 ///
 /// # Errors
 /// As [`print`].
@@ -67,5 +66,7 @@ pub fn print_failure(error: &anyhow::Error) -> Result<()> {
     if PRINTED.load(Ordering::Relaxed) {
         return Ok(());
     }
-    out::json(&named("failure", Told::of(error)))
+    let text = serde_json::to_string(&named("failure", Told::of(error)))?;
+    out::line(format_args!("{text}"));
+    Ok(())
 }

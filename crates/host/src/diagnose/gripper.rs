@@ -10,6 +10,7 @@ use gripper::registers::Kind;
 use gripper::{Activation, Event, Fault, Gripper, Status};
 
 use super::answer::Came;
+use super::cure::cure;
 use super::glove::glove_answers;
 use super::place::{Asked, Place, kind_of};
 use super::raw::{hex, text};
@@ -443,35 +444,5 @@ pub(super) fn says<const X: usize>(
         Activation::Activating | Activation::ChangingMode => {
             findings.note("gripper", what, "waiting until it is done");
         }
-    }
-}
-
-/// What to do about a fault, with the commands for it; `command` makes one of a verb for this gripper.
-pub fn cure(fault: Fault, command: impl Fn(&str) -> Command) -> NextStep {
-    let action = advice(fault.action());
-    let activate = || command("gripper activate");
-    match fault {
-        Fault::ActivationNeeded | Fault::NotActivated => {
-            action.then(" (").then(activate()).then(")")
-        }
-        Fault::UnderVoltage
-        | Fault::Internal
-        | Fault::Activation
-        | Fault::InterferenceLasting
-        | Fault::OverCurrent
-        | Fault::Released
-        | Fault::Unknown(_) => action
-            .then(" (")
-            .then(command("gripper reset"))
-            .then(", then ")
-            .then(activate())
-            .then(": it lets go, then its fingers move)"),
-        Fault::None
-        | Fault::ModeChangeNeeded
-        | Fault::OverTemperature
-        | Fault::ChipNotReady
-        | Fault::NoCommunication
-        | Fault::Interference
-        | Fault::Releasing => action,
     }
 }

@@ -141,21 +141,20 @@ fn describe(options: &Train, task: &Task, course: &Course, tell: &Tell) {
 
 fn stopped(options: &Train, epoch: usize, tell: &Tell) -> Result<()> {
     let file = options.checkpoint.as_deref().unwrap_or(Path::new("?"));
+    let typed = Command::again(&crate::options::typed(), &["--stop-at"]);
+    let next = NextStep::same(Command::more().path("--resume", file)).typed(typed.words());
     if options.json {
         let paused = maps::Paused {
             model: None,
             stopped_at_epoch: epoch,
             checkpoint: file,
+            next,
         };
         return results::print("train", paused);
     }
-    let next = NextStep::same(Command::more().path("--resume", file));
-    let typed = Command::again(&crate::options::typed(), &["--stop-at"]);
     tell.say(format_args!(
-        "stopped    at epoch {epoch}; the state is in {}: the same command with --resume instead of --stop-at goes on, \
-         {}",
+        "stopped    at epoch {epoch}; the state is in {}: the same command with --resume instead of --stop-at goes on, {next}",
         file.display(),
-        next.typed(typed.words())
     ));
     Ok(())
 }
