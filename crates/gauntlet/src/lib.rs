@@ -2,8 +2,9 @@
 //!
 //! | module | what it is for |
 //! |---|---|
-//! | [`cli`], [`commands`] | the command line and its verbs |
+//! | [`cli`], [`commands`], [`options`] | the command line, its verbs, options that several of them have |
 //! | [`out`], [`tell`], [`progress`] | what a person reads |
+//! | [`results`] | what a program reads (`--json`) |
 //! | [`reading`], [`outputs`], [`played`] | files that are read, files that may be written over, motion that is played |
 //! | [`run`], [`live`] | a run as a person sees it, of a bridge in this process or on a chip |
 //!
@@ -12,10 +13,12 @@
 pub mod cli;
 pub mod commands;
 pub mod live;
+pub mod options;
 pub mod out;
 pub mod outputs;
 pub mod played;
 pub mod progress;
 pub mod reading;
+pub mod results;
 pub mod run;
 pub mod tell;

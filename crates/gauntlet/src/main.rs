@@ -3,17 +3,32 @@
 use std::process::ExitCode;
 
 use clap::Parser;
-use gauntlet::cli::Cli;
-use gauntlet::{commands, note, out};
+use gauntlet::cli::{self, Cli};
+use gauntlet::{note, options, out, results};
 use host::failure;
 
+/// A command in the next step that cannot be typed.
+fn unusable(error: &anyhow::Error) -> Option<String> {
+    let next = failure::Told::of(error).next;
+    next.commands().find_map(cli::unusable)
+}
+
 fn main() -> ExitCode {
-    let done = commands::run(Cli::parse());
+    let cli = Cli::parse();
+    let json = cli.json();
+    let done = cli::run(cli).map_err(|error| failure::typed(error, &options::typed()));
+    if let Err(error) = &done
+        && json
+        && let Err(other) = results::print_failure(error)
+    {
+        note!("{other}");
+    }
     // What was printed before a failure is waited for, too.
     let printed = out::check();
     let code = match done.and(printed) {
         Ok(()) => failure::EXIT_DONE,
         Err(error) => {
+            debug_assert_eq!(unusable(&error), None, "a next step cannot be pasted");
             let (text, code) = failure::report(&error);
             note!("{text}");
             code

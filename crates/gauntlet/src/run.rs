@@ -22,7 +22,7 @@ use host::failure::OrFail;
 use host::interrupt::Interrupt;
 use host::recording::{QUEUE, SessionLog};
 use host::session::record::{self, Feed, Records, Sort};
-use host::session::{Driver, Ending, Order, Session, Snapshot};
+use host::session::{Devices, Driver, Ending, Order, Session, Snapshot};
 use shown::Shown;
 
 pub use finished::Finished;
@@ -91,6 +91,7 @@ pub struct Run {
     log_end_noted: bool,
     clock: Clock,
     interrupt: Interrupt,
+    devices: Devices,
     clutch: Clutch,
     /// Somebody can press keys.
     attended: bool,
@@ -107,12 +108,13 @@ pub struct Run {
 }
 
 impl Run {
-    /// Watches `session`, and makes its log when driving begins.
+    /// Watches `session` with `devices`, and makes its log when driving begins.
     pub fn new(
         session: impl Session + 'static,
         log_to: Option<LogTo>,
         clock: Clock,
         interrupt: Interrupt,
+        devices: Devices,
     ) -> Self {
         Self {
             session: Box::new(session),
@@ -121,6 +123,7 @@ impl Run {
             log_end_noted: false,
             clock,
             interrupt,
+            devices,
             clutch: Clutch::default(),
             attended: false,
             shown: Shown::default(),
@@ -216,7 +219,7 @@ impl Run {
 
     fn watch(&mut self, options: &Options) -> Result<End> {
         let terminal = || "the terminal does not work".to_owned();
-        let next = "`gauntlet … | cat`, which prints lines instead";
+        let next = "the same with `| cat` behind it, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
         let suspend = self.interrupt.catch_suspend().or_fail(
             || "Ctrl-Z cannot be caught".to_owned(),
@@ -309,6 +312,7 @@ impl Run {
             stopped,
             ending: self.ending,
             activated: self.activated,
+            devices: self.devices,
         }
     }
 

@@ -2,6 +2,8 @@
 //! by itself whatever comes.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+#[path = "support/pasted.rs"]
+mod pasted;
 mod support;
 
 use std::collections::VecDeque;
@@ -19,6 +21,7 @@ fn doctor(arguments: &[&str]) -> (Option<i32>, Vec<String>, String) {
     let output = run(&[&["doctor", "--json"], arguments].concat());
     let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
     let findings = said["devices"][0]["findings"].as_array().unwrap();
+    pasted::can_be_typed(findings);
     let wrong = findings
         .iter()
         .filter(|finding| finding["verdict"] == "wrong");

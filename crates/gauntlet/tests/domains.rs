@@ -198,6 +198,9 @@ fn a_training_that_stops_and_goes_on_gives_the_same_model_bit_for_bit() {
         let said =
             json(&files.train_with_truth(&["--checkpoint", &state, "--stop-at", epoch, "--json"]));
         assert_eq!(said["stopped_at_epoch"].to_string(), epoch);
+        let on = said["commands"][0].as_array().unwrap();
+        assert!(!on.iter().any(|word| word == "--stop-at"), "{said}");
+        assert_eq!(on[on.len() - 2..], ["--resume", state.as_str()], "{said}");
         assert!(!files.path("map.safetensors").exists());
         let output = files.train_with_truth(&["--resume", &state]);
         assert!(output.status.success(), "{}", text(&output.stderr));
@@ -240,7 +243,12 @@ fn ctrl_c_keeps_the_state_and_says_how_to_go_on() {
         said.contains("interrupted") && said.contains("c.checkpoint"),
         "{said}"
     );
-    assert!(text(&output.stderr).contains("--resume"));
+    let whole = format!("try: `gauntlet train --input {q} --target {x} ");
+    let stderr = text(&output.stderr);
+    assert!(
+        stderr.contains(&whole) && stderr.contains(&format!(" --resume {state}`")),
+        "{stderr}"
+    );
     assert!(files.path("c.checkpoint").exists() && !files.path("map.safetensors").exists());
 }
 

@@ -1,6 +1,8 @@
 //! `gauntlet doctor`: every layer that can fail is named, with what to do about it.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+#[path = "support/pasted.rs"]
+mod pasted;
 mod support;
 
 use std::collections::VecDeque;
@@ -21,6 +23,7 @@ fn doctor(option: &str, path: &str) -> (Option<i32>, serde_json::Value) {
 /// The findings that are wrong, one a line: `layer: what try: next`.
 fn wrongs(said: &serde_json::Value) -> Vec<String> {
     let findings = said["devices"][0]["findings"].as_array().unwrap();
+    pasted::can_be_typed(findings);
     let wrong = findings.iter().filter(|f| f["verdict"] == "wrong");
     let word = |value: &serde_json::Value| value.as_str().unwrap().to_owned();
     wrong

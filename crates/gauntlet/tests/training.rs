@@ -311,7 +311,7 @@ fn a_training_that_is_done_is_kept_though_its_measures_are_not_waited_for() {
     let output = finish(child);
     let said = refusal(&output, 1);
     assert!(said.contains("without its measures"), "{said}");
-    assert!(support::text(&output.stderr).contains("try: gauntlet eval --model"));
+    assert!(support::text(&output.stderr).contains("try: `gauntlet eval --model"));
     let model = trainer::model::Model::load(&out).unwrap();
     assert_eq!(model.metadata["pairs"], "2");
     assert!(!model.metadata.contains_key("dbar"));

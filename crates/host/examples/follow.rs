@@ -8,7 +8,7 @@ use host::interrupt::Interrupt;
 use host::lines::{Model, Settings};
 use host::probe;
 use host::report::Nobody;
-use host::session::{InProcess, Order, Parts, Session};
+use host::session::{Devices, InProcess, Order, Parts, Session};
 
 const BEAT: Duration = Duration::from_millis(100);
 
@@ -40,6 +40,6 @@ fn main() -> anyhow::Result<()> {
             break;
         }
     }
-    println!("{}", session.stop()?.judge()?);
+    println!("{}", session.stop()?.judge(&Devices::Unknown)?);
     Ok(())
 }

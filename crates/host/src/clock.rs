@@ -63,6 +63,12 @@ pub fn since_boot() -> Duration {
     )
 }
 
+/// Time from `then` to `now`; nothing where `then` is later.
+pub fn since(now: Instant, then: Instant) -> gripper::Duration {
+    now.checked_duration_since(then)
+        .unwrap_or(gripper::Duration::from_ticks(0))
+}
+
 /// A span as the device crates have it.
 pub fn ticks(span: Duration) -> gripper::Duration {
     gripper::Duration::from_ticks(u64::try_from(span.as_micros()).unwrap_or(u64::MAX))

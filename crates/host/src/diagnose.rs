@@ -4,6 +4,7 @@
 //! reads them does.
 
 mod answer;
+mod cure;
 mod glove;
 mod gripper;
 mod network;
@@ -14,11 +15,13 @@ mod serial;
 
 use serde::Serialize;
 
+pub use cure::cure;
 pub use glove::{glove, keeps_registers, missing_sensors, no_glove, no_sensors};
 pub use gripper::{gripper, no_gripper};
 pub use place::{Asked, Place};
 
 use crate::failure::Failure;
+use crate::next::NextStep;
 
 /// How a finding is meant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -42,8 +45,8 @@ pub struct Finding {
     /// What it is.
     pub what: String,
     /// What to do about it.
-    #[serde(rename = "try", skip_serializing_if = "Option::is_none")]
-    pub next: Option<String>,
+    #[serde(flatten)]
+    pub next: Option<NextStep>,
 }
 
 /// Findings in the order of the layers.
@@ -56,11 +59,11 @@ impl Findings {
         self.add(layer, Verdict::Good, what.into(), None);
     }
 
-    fn note(&mut self, layer: &'static str, what: impl Into<String>, next: impl Into<String>) {
+    fn note(&mut self, layer: &'static str, what: impl Into<String>, next: impl Into<NextStep>) {
         self.add(layer, Verdict::Note, what.into(), Some(next.into()));
     }
 
-    fn wrong(&mut self, layer: &'static str, what: impl Into<String>, next: impl Into<String>) {
+    fn wrong(&mut self, layer: &'static str, what: impl Into<String>, next: impl Into<NextStep>) {
         self.add(layer, Verdict::Wrong, what.into(), Some(next.into()));
     }
 
@@ -74,10 +77,10 @@ impl Findings {
     }
 
     fn failure(&mut self, layer: &'static str, failure: &Failure) {
-        self.wrong(layer, failure.to_string(), failure.next_step());
+        self.wrong(layer, failure.to_string(), failure.next());
     }
 
-    fn add(&mut self, layer: &'static str, verdict: Verdict, what: String, next: Option<String>) {
+    fn add(&mut self, layer: &'static str, verdict: Verdict, what: String, next: Option<NextStep>) {
         self.0.push(Finding {
             layer,
             verdict,

@@ -5,6 +5,11 @@
 
 use std::fmt;
 
+use serde::Serialize;
+use trainer::remedy::Remedy;
+
+use crate::next::NextStep;
+
 /// Exit code when the work was done.
 pub const EXIT_DONE: u8 = 0;
 /// Exit code when the work failed.
@@ -16,7 +21,7 @@ pub const EXIT_USAGE: u8 = 2;
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Failure {
     what: String,
-    next: String,
+    next: NextStep,
     exit: u8,
     /// What else went wrong.
     others: Vec<String>,
@@ -24,7 +29,7 @@ pub struct Failure {
 
 impl Failure {
     /// A failure of the work: exit code 1. `what` names the thing and its value, `next` the next step.
-    pub fn new(what: impl Into<String>, next: impl Into<String>) -> Self {
+    pub fn new(what: impl Into<String>, next: impl Into<NextStep>) -> Self {
         Self {
             what: what.into(),
             next: next.into(),
@@ -34,7 +39,7 @@ impl Failure {
     }
 
     /// A command given wrongly: exit code 2.
-    pub fn usage(what: impl Into<String>, next: impl Into<String>) -> Self {
+    pub fn usage(what: impl Into<String>, next: impl Into<NextStep>) -> Self {
         Self {
             exit: EXIT_USAGE,
             ..Self::new(what, next)
@@ -50,8 +55,13 @@ impl Failure {
     }
 
     /// What a person can do next.
-    pub fn next_step(&self) -> &str {
+    pub fn next(&self) -> &NextStep {
         &self.next
+    }
+
+    /// The same in words.
+    pub fn next_step(&self) -> String {
+        self.next.to_string()
     }
 
     /// The process's exit code.
@@ -74,22 +84,23 @@ pub trait OrFail<T> {
     ///
     /// # Errors
     /// The failure, where `self` was an error.
-    fn or_fail(self, what: impl FnOnce() -> String, next: impl Into<String>) -> anyhow::Result<T>;
+    fn or_fail(self, what: impl FnOnce() -> String, next: impl Into<NextStep>)
+    -> anyhow::Result<T>;
 }
 
 impl<T, E: fmt::Display> OrFail<T> for Result<T, E> {
-    fn or_fail(self, what: impl FnOnce() -> String, next: impl Into<String>) -> anyhow::Result<T> {
+    fn or_fail(
+        self,
+        what: impl FnOnce() -> String,
+        next: impl Into<NextStep>,
+    ) -> anyhow::Result<T> {
         self.map_err(|error| Failure::new(format!("{}: {error}", what()), next).into())
     }
 }
 
-/// A library's error whose text ends with the next step after its last semicolon, as theirs do.
-pub fn told(error: impl fmt::Display) -> anyhow::Error {
-    let text = error.to_string();
-    match text.rsplit_once("; ") {
-        Some((what, next)) => Failure::new(what, next).into(),
-        None => Failure::new(text, "").into(),
-    }
+/// An error of the trainer, with what helps.
+pub fn told(error: impl Remedy) -> anyhow::Error {
+    Failure::new(error.to_string(), error.remedy()).into()
 }
 
 /// `first`, and what went wrong besides, which is told after it.
@@ -106,19 +117,63 @@ pub fn with_others(first: anyhow::Error, others: Vec<String>) -> anyhow::Error {
     }
 }
 
+/// `error` for whoever typed `words`: where its next step is "the same again with", it is a command.
+pub fn typed(error: anyhow::Error, words: &[String]) -> anyhow::Error {
+    let what = format!("{error:#}");
+    match error.downcast::<Failure>() {
+        Ok(failure) => {
+            let next = failure.next.typed(words);
+            Failure {
+                what,
+                next,
+                ..failure
+            }
+            .into()
+        }
+        Err(error) => error,
+    }
+}
+
+/// A failure as data.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Told {
+    /// What failed.
+    pub error: String,
+    /// What a person can do next.
+    #[serde(flatten)]
+    pub next: NextStep,
+    /// What else went wrong.
+    pub also: Vec<String>,
+    /// Exit code of the process.
+    pub exit_code: u8,
+}
+
+impl Told {
+    /// Any error.
+    pub fn of(error: &anyhow::Error) -> Self {
+        let failure = error.downcast_ref::<Failure>();
+        Self {
+            error: one_line(&format!("{error:#}")),
+            next: failure.map_or_else(NextStep::default, |failure| failure.next.clone()),
+            also: failure.map_or_else(Vec::new, |failure| failure.others.clone()),
+            exit_code: failure.map_or(EXIT_FAILED, Failure::exit_code),
+        }
+    }
+}
+
 /// The lines for standard error, and the exit code.
 pub fn report(error: &anyhow::Error) -> (String, u8) {
-    let failure = error.downcast_ref::<Failure>();
-    let mut text = format!("error: {}", one_line(&format!("{error:#}")));
-    if let Some(failure) = failure.filter(|failure| !failure.next.is_empty()) {
+    let told = Told::of(error);
+    let mut text = format!("error: {}", told.error);
+    if !told.next.is_empty() {
         text.push_str("\n  try: ");
-        text.push_str(&one_line(&failure.next));
+        text.push_str(&one_line(&told.next.to_string()));
     }
-    for other in failure.iter().flat_map(|failure| &failure.others) {
+    for other in &told.also {
         text.push_str("\nalso: ");
         text.push_str(&one_line(other));
     }
-    (text, failure.map_or(EXIT_FAILED, Failure::exit_code))
+    (text, told.exit_code)
 }
 
 fn one_line(text: &str) -> String {

@@ -8,7 +8,8 @@
 //! | [`training`] | maps of hands, and of other domains, from files |
 //! | [`chip`] | the host protocol, and the emulator |
 //! | [`diagnose`] | what is wrong with a line, and what to do |
-//! | [`failure`], [`report`], [`interrupt`] | what failed and what helps; who is told; Ctrl-C |
+//! | [`failure`], [`next`] | what failed; what helps, in words and as commands |
+//! | [`report`], [`interrupt`] | who is told; Ctrl-C |
 //! | [`clock`], [`realtime`], [`stats`], [`words`] | time, priority, percentiles, codes in words |
 //!
 //! No command line, no terminal, no printing: who calls decides what a person sees. Nothing moves by connecting; the clutch
@@ -26,6 +27,7 @@ pub mod diagnose;
 pub mod failure;
 pub mod interrupt;
 pub mod lines;
+pub mod next;
 pub mod probe;
 pub mod realtime;
 pub mod recording;

@@ -3,78 +3,48 @@
 use std::collections::VecDeque;
 use std::time::Duration;
 
-/// Buckets to an octave: a percentile is right to 1/64, 1.6 %.
-const STEPS: usize = 64;
+use hdrhistogram::Histogram;
+use serde::Serializer;
+
 /// Values up to 2^24 µs, 16.8 s; anything longer counts as that.
-const OCTAVES: usize = 24;
+const LONGEST_US: u64 = (1 << 24) - 1;
+/// Decimal digits that a percentile is right to: 1 %.
+const DIGITS: u8 = 2;
 
-/// Percentiles of durations with 1.6 % resolution in 12 kB, however long the run.
-#[derive(Debug, Clone)]
+/// Percentiles of durations with 1 % resolution in some kilobytes, however long the run.
+#[derive(Debug, Clone, Default)]
 pub struct Percentiles {
-    buckets: Vec<u64>,
-    count: u64,
+    /// From the first duration on.
+    counts: Option<Histogram<u64>>,
     longest_us: u64,
-}
-
-impl Default for Percentiles {
-    fn default() -> Self {
-        Self {
-            buckets: vec![0; STEPS * OCTAVES],
-            count: 0,
-            longest_us: 0,
-        }
-    }
-}
-
-fn bucket_of(us: u64) -> usize {
-    let us = us.min((1 << OCTAVES) - 1);
-    if us < STEPS as u64 {
-        return us as usize;
-    }
-    let octave = us.ilog2() as usize - STEPS.ilog2() as usize;
-    // Between STEPS and 2·STEPS within its octave.
-    let step = (us >> octave) as usize;
-    octave * STEPS + step
-}
-
-/// Upper edge of a bucket.
-fn edge_of(bucket: usize) -> u64 {
-    if bucket < 2 * STEPS {
-        return bucket as u64;
-    }
-    let octave = bucket / STEPS - 1;
-    let step = (bucket - octave * STEPS) as u64;
-    ((step + 1) << octave) - 1
 }
 
 impl Percentiles {
     /// Counts one duration in.
     pub fn add(&mut self, us: u64) {
-        if let Some(bucket) = self.buckets.get_mut(bucket_of(us)) {
-            *bucket += 1;
+        if self.counts.is_none() {
+            self.counts = Histogram::new_with_bounds(1, LONGEST_US, DIGITS).ok();
         }
-        self.count += 1;
+        if let Some(counts) = &mut self.counts {
+            counts.saturating_record(us);
+        }
         self.longest_us = self.longest_us.max(us);
     }
 
     /// The duration, in µs, that a share `share` (0 to 1) of all stay within; `None` before the first.
     pub fn at(&self, share: f64) -> Option<u64> {
-        let wanted = ((share * self.count as f64).ceil() as u64).clamp(1, self.count.max(1));
-        let mut seen = 0;
-        self.buckets.iter().enumerate().find_map(|(bucket, count)| {
-            seen += count;
-            (*count > 0 && seen >= wanted).then(|| edge_of(bucket).min(self.longest_us))
-        })
+        let counts = self.counts.as_ref()?;
+        Some(counts.value_at_quantile(share).min(self.longest_us))
     }
 
     /// How many durations were counted.
     pub fn count(&self) -> u64 {
-        self.count
+        self.counts.as_ref().map_or(0, Histogram::len)
     }
 
     /// The longest, µs.
     pub fn longest(&self) -> Option<u64> {
-        (self.count > 0).then_some(self.longest_us)
+        self.counts.is_some().then_some(self.longest_us)
     }
 }
 
@@ -153,6 +123,28 @@ fn ratio(events: u64, span_us: u64) -> f64 {
     events as f64 / (span_us as f64 / 1e6)
 }
 
+/// For a field of a result: JSON has no NaN, and `null` would say nothing. A number that is none is a word: "NaN", "inf".
+///
+/// # Errors
+/// Those of `to`.
+pub fn number<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
+    match value.is_finite() {
+        true => to.serialize_f64(*value),
+        false => to.serialize_str(&value.to_string()),
+    }
+}
+
+/// The same for one that may not be there.
+///
+/// # Errors
+/// Those of `to`.
+pub fn number_or_null<S: Serializer>(value: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+    match value {
+        Some(value) => number(value, to),
+        None => to.serialize_none(),
+    }
+}
+
 /// A short duration as a person reads it: `3.4 ms`, `870 µs`, `1.20 s`.
 pub fn short(us: u64) -> String {
     match us {
@@ -215,11 +207,13 @@ mod tests {
     }
 
     #[test]
-    fn every_bucket_ends_where_its_values_do() {
-        for us in (0..5_000).chain([1 << 20, (1 << 24) - 1, u64::MAX]) {
-            let edge = edge_of(bucket_of(us));
-            assert_eq!(bucket_of(edge), bucket_of(us), "{us}");
-            assert!(edge >= us.min((1 << 24) - 1));
+    fn one_value_is_told_as_it_is_and_beyond_the_longest_as_that() {
+        for us in (0..5_000).chain([1 << 20, LONGEST_US, u64::MAX]) {
+            let mut one = Percentiles::default();
+            one.add(us);
+            let told = one.at(0.5).unwrap();
+            assert!(told <= us && told >= us.min(LONGEST_US), "{us}: {told}");
+            assert_eq!((one.count(), one.longest()), (1, Some(us)));
         }
     }
 

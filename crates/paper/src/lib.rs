@@ -3,12 +3,14 @@
 
 pub mod figure;
 mod laboratory;
+pub mod plan;
 mod principal;
 pub mod printed;
 pub mod shapes;
 pub mod stats;
 mod store;
 mod table;
+pub mod text;
 
 pub use laboratory::{Laboratory, Outcome, Prepared, Stage, Watch};
 pub use principal::Principal;
@@ -19,6 +21,7 @@ use crate::shapes::ShapePair;
 use trainer::algorithm::{Plan, Schedule};
 use trainer::cost::Cost;
 use trainer::network::Initialisation;
+use trainer::remedy::Remedy;
 
 /// Where the samples come from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -295,7 +298,7 @@ pub enum Error {
     #[error(transparent)]
     Model(#[from] trainer::model::Error),
     /// The folder of kept cells.
-    #[error("cannot use {}: {source}; check that the folder exists and that you may write there", path.display())]
+    #[error("cannot use {}: {source}", path.display())]
     Folder {
         /// Which file or folder.
         path: std::path::PathBuf,
@@ -303,7 +306,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// A cell asks for a recording and there is none.
-    #[error("this experiment needs a recording of a hand; give one with --poses")]
+    #[error("this experiment needs a recording of a hand")]
     NoRecording,
     /// A cell asks for matched outlines of something that has none.
     #[error("{0}: pairs from the outline are there for the shapes SP1 to SP4 only")]
@@ -311,6 +314,23 @@ pub enum Error {
     /// Asked to stop.
     #[error("stopped; the cells that are done are kept")]
     Stopped,
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::Shapes(_) => String::new(),
+            Self::Operator(error) => error.remedy(),
+            Self::Training { source, .. } => source.remedy(),
+            Self::Model(error) => error.remedy(),
+            Self::Folder { .. } => {
+                "check that the folder exists and that you may write there".to_owned()
+            }
+            Self::NoRecording => "give one with --poses".to_owned(),
+            Self::NoOutline(_) => String::new(),
+            Self::Stopped => String::new(),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -1,5 +1,7 @@
 //! Mean, median, spread, and the t-test of §3.2.3.
 
+use statrs::function::beta::beta_reg;
+
 /// What ten repetitions say.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Summary {
@@ -86,54 +88,7 @@ pub fn paired_t_test(a: &[f64], b: &[f64]) -> Option<TTest> {
 
 /// P(|T| > |t|) = I_{ν/(ν+t²)}(ν/2, ½).
 fn two_sided(t: f64, freedom: f64) -> f64 {
-    incomplete_beta(freedom / (freedom + t * t), freedom / 2.0, 0.5)
-}
-
-/// The regularised incomplete beta function, by its continued fraction (Numerical Recipes §6.4; Lentz's method).
-fn incomplete_beta(x: f64, a: f64, b: f64) -> f64 {
-    if x <= 0.0 || x >= 1.0 {
-        return x.clamp(0.0, 1.0);
-    }
-    let front = libm::exp(
-        libm::lgamma(a + b) - libm::lgamma(a) - libm::lgamma(b)
-            + a * libm::log(x)
-            + b * libm::log(1.0 - x),
-    );
-    // The fraction converges fast on this side; the other follows by symmetry.
-    if x < (a + 1.0) / (a + b + 2.0) {
-        front * beta_fraction(x, a, b) / a
-    } else {
-        1.0 - front * beta_fraction(1.0 - x, b, a) / b
-    }
-}
-
-fn beta_fraction(x: f64, a: f64, b: f64) -> f64 {
-    const TINY: f64 = 1e-300;
-    let keep = |value: f64| {
-        if libm::fabs(value) < TINY {
-            TINY
-        } else {
-            value
-        }
-    };
-    let mut c = 1.0;
-    let mut d = 1.0 / keep(1.0 - (a + b) * x / (a + 1.0));
-    let mut fraction = d;
-    for step in 1..500 {
-        let m = f64::from(step);
-        let even = m * (b - m) * x / ((a + 2.0 * m - 1.0) * (a + 2.0 * m));
-        d = 1.0 / keep(1.0 + even * d);
-        c = keep(1.0 + even / c);
-        fraction *= d * c;
-        let odd = -(a + m) * (a + b + m) * x / ((a + 2.0 * m) * (a + 2.0 * m + 1.0));
-        d = 1.0 / keep(1.0 + odd * d);
-        c = keep(1.0 + odd / c);
-        fraction *= d * c;
-        if libm::fabs(d * c - 1.0) < 1e-15 {
-            break;
-        }
-    }
-    fraction
+    beta_reg(freedom / 2.0, 0.5, freedom / (freedom + t * t))
 }
 
 #[cfg(test)]

@@ -21,5 +21,6 @@ pub mod operator;
 pub mod optimizer;
 pub(crate) mod pool;
 pub mod random;
+pub mod remedy;
 pub mod spread;
 pub mod whole_file;

@@ -2,6 +2,7 @@
 //! a script that answers as a person would, or the ground truth of synthetic data.
 
 use crate::data::{Matrix, Pairs};
+use crate::remedy::Remedy;
 
 /// Answers with the input that should be mapped to a target. Both are in the units of their domain (radians, counts), not in
 /// network units.
@@ -17,9 +18,7 @@ pub trait Operator {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Error {
     /// The target has another number of values.
-    #[error(
-        "the target has {found} values, this operator shows inputs for {expected}; train for a domain of {expected} values"
-    )]
+    #[error("the target has {found} values, this operator shows inputs for {expected}")]
     Shape {
         /// Values of the target.
         found: usize,
@@ -27,9 +26,7 @@ pub enum Error {
         expected: usize,
     },
     /// A value of the target is NaN or infinite.
-    #[error(
-        "value {index} of the target is {value}, which is not finite; check the target samples"
-    )]
+    #[error("value {index} of the target is {value}, which is not finite")]
     NotFinite {
         /// Which value, from 0.
         index: usize,
@@ -37,7 +34,7 @@ pub enum Error {
         value: f32,
     },
     /// There is no recorded sample or no pair to answer from.
-    #[error("there is no {what} to answer from; give a file with at least one row")]
+    #[error("there is no {what} to answer from")]
     Nothing {
         /// What is missing.
         what: &'static str,
@@ -48,6 +45,17 @@ pub enum Error {
         /// Why.
         why: String,
     },
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::Shape { expected, .. } => format!("train for a domain of {expected} values"),
+            Self::NotFinite { .. } => "check the target samples".to_owned(),
+            Self::Nothing { .. } => "give a file with at least one row".to_owned(),
+            Self::Declined { .. } => String::new(),
+        }
+    }
 }
 
 /// Refuses a target of the wrong length or with a value that is not finite.

@@ -114,9 +114,27 @@ pub enum Error {
     },
 }
 
-impl core::fmt::Display for Error {
+/// What is wrong, without what helps.
+struct Problem<'a>(&'a Error);
+
+/// What helps.
+struct Remedy<'a>(&'a Error);
+
+impl Error {
+    /// What is wrong, without what helps.
+    pub fn problem(&self) -> impl core::fmt::Display + '_ {
+        Problem(self)
+    }
+
+    /// What helps.
+    pub fn remedy(&self) -> impl core::fmt::Display + '_ {
+        Remedy(self)
+    }
+}
+
+impl core::fmt::Display for Problem<'_> {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
+        match self.0 {
             Error::Geometry {
                 slot,
                 write_size,
@@ -124,78 +142,110 @@ impl core::fmt::Display for Error {
                 capacity,
             } => write!(
                 f,
-                "slot {slot}: program unit {write_size}, erase block {erase_size}, capacity {capacity} bytes do not fit: give a program unit that is a power of two up to 256 and two erase blocks or more"
+                "slot {slot}: program unit {write_size}, erase block {erase_size}, capacity {capacity} bytes do not fit"
             ),
-            Error::Engaged => f.write_str("the clutch is closed: release it, then write weights"),
-            Error::NotBegun => f.write_str("no weights image is being written: begin one"),
-            Error::Busy => {
-                f.write_str("a weights image is being written: commit or abort it first")
-            }
+            Error::Engaged => f.write_str("the clutch is closed"),
+            Error::NotBegun => f.write_str("no weights image is being written"),
+            Error::Busy => f.write_str("a weights image is being written"),
             Error::TooLong { length, capacity } => {
-                write!(
-                    f,
-                    "the image has {length} bytes, a slot takes {capacity}: choose a smaller map"
-                )
+                write!(f, "the image has {length} bytes, a slot takes {capacity}")
             }
             Error::Offset { found, expected } => {
                 write!(
                     f,
-                    "the chunk begins at byte {found}, byte {expected} comes next: send from there"
+                    "the chunk begins at byte {found}, byte {expected} comes next"
                 )
             }
             Error::Overrun { end, length } => {
                 write!(
                     f,
-                    "the chunk ends at byte {end}, {length} bytes were announced: begin anew with the right length"
+                    "the chunk ends at byte {end}, {length} bytes were announced"
                 )
             }
-            Error::Incomplete { found, expected } => write!(
-                f,
-                "{found} of {expected} bytes came: send the rest, then commit"
-            ),
+            Error::Incomplete { found, expected } => {
+                write!(f, "{found} of {expected} bytes came")
+            }
             Error::Image(error) => write!(f, "not a weights image: {error}"),
             Error::Length { found, expected } => {
                 write!(
                     f,
-                    "the image's header says {found} bytes, {expected} were announced: begin anew with {found}"
+                    "the image's header says {found} bytes, {expected} were announced"
                 )
             }
             Error::Shape { found, expected } => {
                 write!(
                     f,
-                    "the image is {found:?} (inputs, hidden units, outputs), this bridge takes {expected:?}: train a model for this gripper"
+                    "the image is {found:?} (inputs, hidden units, outputs), this bridge takes {expected:?}"
                 )
             }
             Error::JointOrder { found, expected } => {
                 write!(
                     f,
-                    "the image takes {found:?} inputs, this bridge gives {expected:?}: train on poses with the 25 joint names"
+                    "the image takes {found:?} inputs, this bridge gives {expected:?}"
                 )
             }
             Error::Older { found, active } => {
                 write!(
                     f,
-                    "the image's version {found} is below the active one's {active}: export it with version {active} or higher, or select the other slot"
+                    "the image's version {found} is below the active one's {active}"
                 )
             }
             Error::ReadBack { slot, offset } => {
                 write!(
                     f,
-                    "slot {slot} does not read back what was written at byte {offset}: try again; if it stays, the flash is worn out"
+                    "slot {slot} does not read back what was written at byte {offset}"
                 )
             }
             Error::Flash { slot, offset, kind } => {
-                write!(f, "slot {slot}, byte {offset}: {kind}: try again")
+                write!(f, "slot {slot}, byte {offset}: {kind}")
             }
-            Error::NoImage { slot } => write!(
-                f,
-                "slot {slot} holds no whole image: select the other one, or flash one"
-            ),
-            Error::NoSlot { slot } => write!(f, "there is no slot {slot}: choose 0 or 1"),
-            Error::RecordsFull { slot } => write!(
-                f,
-                "slot {slot} has no room for another record: flash an image instead"
-            ),
+            Error::NoImage { slot } => write!(f, "slot {slot} holds no whole image"),
+            Error::NoSlot { slot } => write!(f, "there is no slot {slot}"),
+            Error::RecordsFull { slot } => {
+                write!(f, "slot {slot} has no room for another record")
+            }
+        }
+    }
+}
+
+impl core::fmt::Display for Remedy<'_> {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self.0 {
+            Error::Geometry { .. } => {
+                "give a program unit that is a power of two up to 256 and two erase blocks or more"
+            }
+            Error::Engaged => "release it, then write weights",
+            Error::NotBegun => "begin one",
+            Error::Busy => "commit or abort it first",
+            Error::TooLong { .. } => "choose a smaller map",
+            Error::Offset { .. } => "send from there",
+            Error::Overrun { .. } => "begin anew with the right length",
+            Error::Incomplete { .. } => "send the rest, then commit",
+            Error::Image(_) => "give one that is whole",
+            Error::Length { found, .. } => return write!(f, "begin anew with {found}"),
+            Error::Shape { .. } => "train a model for this gripper",
+            Error::JointOrder { .. } => "train on poses with the 25 joint names",
+            Error::Older { active, .. } => {
+                return write!(
+                    f,
+                    "export it with version {active} or higher, or select the other slot"
+                );
+            }
+            Error::ReadBack { .. } => "try again; if it stays, the flash is worn out",
+            Error::Flash { .. } => "try again",
+            Error::NoImage { .. } => "select the other one, or flash one",
+            Error::NoSlot { .. } => "choose 0 or 1",
+            Error::RecordsFull { .. } => "flash an image instead",
+        })
+    }
+}
+
+impl core::fmt::Display for Error {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            // Its own words end with what helps.
+            Self::Image(_) => write!(f, "{}", self.problem()),
+            _ => write!(f, "{}: {}", self.problem(), self.remedy()),
         }
     }
 }

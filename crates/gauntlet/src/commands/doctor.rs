@@ -4,16 +4,17 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use serde_json::json;
 
-use crate::cli::LineOptions;
+use crate::options::LineOptions;
 use crate::progress::Person;
-use crate::{out, say};
+use crate::results::{self, devices};
+use crate::say;
 use host::diagnose::{self, Asked, Findings, Verdict};
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::lines::list;
+use host::next::Command;
 
 /// Options of `doctor`.
 #[derive(Debug, Args)]
@@ -50,13 +51,17 @@ pub struct Doctor {
 ///
 /// # Errors
 /// A failure (exit code 1) when something is wrong.
-pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
     let mut all = Vec::new();
     let mut examine = |device: &'static str, place: String, findings: Findings| {
         if !options.json {
             show(device, &place, &findings);
         }
-        all.push((device, place, findings));
+        all.push(devices::Examined {
+            device,
+            place,
+            findings,
+        });
     };
     if let Some(path) = &options.gripper {
         let asked = Asked {
@@ -74,15 +79,14 @@ pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
     if all.is_empty() {
         return only_ports(options.json);
     }
-    let faults: usize = all.iter().map(|(_, _, findings)| findings.faults()).sum();
+    let faults: usize = all.iter().map(|device| device.findings.faults()).sum();
     if options.json {
-        let devices: Vec<_> = all
-            .iter()
-            .map(|(device, place, findings)| {
-                json!({ "device": device, "place": place, "findings": findings })
-            })
-            .collect();
-        out::json(&json!({ "devices": devices, "wrong": faults }))?;
+        let doctor = devices::Doctor {
+            devices: &all,
+            wrong: faults,
+            ports: None,
+        };
+        results::print("doctor", doctor)?;
     }
     if interrupt.asked() {
         return Err(Failure::interrupted("before everything was examined").into());
@@ -90,9 +94,7 @@ pub(super) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
     match faults {
         0 => Ok(()),
         1 => {
-            let next = all
-                .iter()
-                .find_map(|(_, _, findings)| findings.first_wrong());
+            let next = all.iter().find_map(|device| device.findings.first_wrong());
             let next = next.and_then(|wrong| wrong.next.clone());
             Err(Failure::new("1 thing is wrong", next.unwrap_or_default()).into())
         }
@@ -128,7 +130,12 @@ fn only_ports(as_json: bool) -> Result<()> {
         "`ls /dev/tty*`",
     )?;
     if as_json {
-        out::json(&json!({ "devices": [], "ports": ports }))?;
+        let doctor = devices::Doctor {
+            devices: &[],
+            wrong: 0,
+            ports: Some(&ports),
+        };
+        results::print("doctor", doctor)?;
     } else {
         for port in &ports {
             say!("port  {}", port.path.display());
@@ -145,7 +152,10 @@ fn only_ports(as_json: bool) -> Result<()> {
         .into());
     }
     if !as_json {
-        say!("name a device for more: gauntlet doctor --gripper PORT --glove PORT");
+        let doctor = Command::gauntlet("doctor")
+            .option("--gripper", "PORT")
+            .option("--glove", "PORT");
+        say!("name a device for more: {doctor}");
     }
     Ok(())
 }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::{ArgGroup, Args};
-use serde_json::json;
 use trainer::data::{Matrix, require_rows, sha256};
 use trainer::hand::{Draw, Space};
 use trainer::measures::NEIGHBOURS;
@@ -12,7 +11,8 @@ use trainer::model::Model;
 
 use super::train::CoverageArgs;
 use crate::progress::Person;
-use crate::{note, out, say};
+use crate::results::{self, maps};
+use crate::{note, say};
 use host::failure::{Failure, told};
 use host::training::model;
 use host::training::motion::Motion;
@@ -68,7 +68,7 @@ pub struct Eval {
 ///
 /// # Errors
 /// A failure that names the file and what is wrong with it.
-pub(super) fn run(options: &Eval) -> Result<()> {
+pub(crate) fn run(options: &Eval) -> Result<()> {
     match (&options.poses, &options.input, &options.target) {
         (Some(poses), ..) => of_hand(options, poses),
         (_, Some(input), Some(target)) => of_domains(options, input, target),
@@ -94,13 +94,9 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
         format!("frames of {}", poses.display()),
     );
     if options.json {
-        return out::json(&json!({
-            "model": options.model,
-            "metadata": model.metadata,
-            "held_out": held_out,
-            "quality": quality,
-            "good": quality.good(),
-        }));
+        let good = Some(quality.good());
+        let measures = maps::Measures::Hand(&quality);
+        return print(options, &model, held_out, measures, good);
     }
     say!("model              {}", options.model.display());
     say!(
@@ -167,12 +163,8 @@ fn of_domains(options: &Eval, input: &Path, target: &Path) -> Result<()> {
         format!("rows of {}", input.display()),
     );
     if options.json {
-        return out::json(&json!({
-            "model": options.model,
-            "metadata": model.metadata,
-            "held_out": held_out,
-            "quality": measured,
-        }));
+        let measures = maps::Measures::Domains(&measured);
+        return print(options, &model, held_out, measures, None);
     }
     let or_dash = |value: Option<f64>| value.map_or("—".to_owned(), |v| format!("{v:.3}"));
     say!("model              {}", options.model.display());
@@ -191,6 +183,23 @@ fn of_domains(options: &Eval, input: &Path, target: &Path) -> Result<()> {
     }
     trained_with(&model);
     Ok(())
+}
+
+fn print(
+    options: &Eval,
+    model: &Model,
+    held_out: Option<bool>,
+    quality: maps::Measures<'_>,
+    good: Option<bool>,
+) -> Result<()> {
+    let evaluated = maps::Evaluated {
+        model: &options.model,
+        metadata: &model.metadata,
+        held_out,
+        quality,
+        good,
+    };
+    results::print("eval", evaluated)
 }
 
 /// Whether the samples did not train the model; `None` when the model does not say.

@@ -4,12 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use serde_json::json;
 use trainer::whole_file;
 
-use crate::out;
 use crate::outputs::{self, Kind};
 use crate::progress::Person;
+use crate::results::{self, maps};
 use crate::tell::Tell;
 use host::failure::OrFail;
 use host::training::model;
@@ -43,7 +42,7 @@ pub struct Export {
 ///
 /// # Errors
 /// A failure that names the file and what is wrong with it.
-pub(super) fn run(options: &Export) -> Result<()> {
+pub(crate) fn run(options: &Export) -> Result<()> {
     let tell = Tell::new(options.json);
     let mut inputs = vec![options.model.as_path()];
     inputs.extend(options.int16.as_deref());
@@ -55,12 +54,13 @@ pub(super) fn run(options: &Export) -> Result<()> {
         "a folder with room that you may write in",
     )?;
     if options.json {
-        return out::json(&json!({
-            "image": options.out,
-            "bytes": weights.image.len(),
-            "replaced": replaced,
-            "int16": weights.int16,
-        }));
+        let exported = maps::Exported {
+            image: &options.out,
+            bytes: weights.image.len(),
+            replaced,
+            int16: weights.int16.as_ref(),
+        };
+        return results::print("export", exported);
     }
     if let Some(int16) = &weights.int16 {
         tell.say(format_args!("int16      {}", int16.line()));

@@ -1,24 +1,52 @@
 //! `gauntlet flash`: weights into a bridge on a chip.
 
+use std::path::PathBuf;
+
 use anyhow::Result;
 use bridge::protocol::message::{SlotContents, Slots, WeightsKind};
-use serde::Serialize;
+use clap::Args;
 
-use crate::cli::Flash;
 use crate::progress::Person;
 use crate::progress::Progress;
+use crate::reading;
+use crate::results::{self, maps};
 use crate::tell::Tell;
-use crate::{out, reading};
-use host::chip::link::{Flashed, HostLink};
-use host::failure::Failure;
+use host::chip::link::{Address, Flashed, HostLink};
 use host::interrupt::Interrupt;
-use host::training::model::{self, Int16};
+use host::training::model;
+
+/// Options of `flash`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet flash model.safetensors --bridge /dev/ttyUSB0
+  gauntlet flash model.safetensors --bridge unix:/tmp/gauntlet/host.sock --json
+  gauntlet flash weights.hae --bridge tcp:localhost:4000
+  gauntlet flash model.safetensors --int16 my_hand.csv --bridge /dev/ttyUSB0
+
+The bridge keeps its old weights until the new image is there, whole and checked: power may go at any moment. \
+A broken line is waited for and opened again; the transfer goes on where the bridge says it was. At the end \
+the bridge reads its flash and the CRC is compared. Refused while the clutch is closed.")]
+pub struct Flash {
+    /// A trained model (MODEL.safetensors) or a weights image.
+    #[arg(value_name = "MODEL|IMAGE")]
+    pub file: PathBuf,
+    /// The bridge: a serial port, unix:PATH or tcp:HOST:PORT.
+    #[arg(long, value_name = "PORT")]
+    pub bridge: Address,
+    /// Write the model's weights as 16-bit integers, calibrated on these hand poses: faster on a chip, half as long.
+    #[arg(long, value_name = "POSES.csv")]
+    pub int16: Option<PathBuf>,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Writes the file's weights into the bridge.
 ///
 /// # Errors
 /// A failure that names the file, the line, or what the bridge refuses.
-pub(super) fn run(options: &Flash, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Flash, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let weights = reading::ended_by(interrupt, "what is to be written", || {
         model::weights(&options.file, options.int16.as_deref(), &Person)
@@ -26,27 +54,19 @@ pub(super) fn run(options: &Flash, interrupt: &Interrupt) -> Result<()> {
     if let Some(int16) = &weights.int16 {
         tell.say(format_args!("int16      {}", int16.line()));
     }
-    let mut link = HostLink::connect(&options.bridge).map_err(Failure::from)?;
+    let mut link = HostLink::connect(&options.bridge).map_err(|error| error.at(&options.bridge))?;
     let flashed = flash(&mut link, &weights.image, &tell, interrupt)?;
     if options.json {
-        return out::json(&Told {
+        let stored = maps::Stored {
             flashed: &flashed,
             int16: weights.int16.as_ref(),
-        });
+        };
+        return results::print("flash", stored);
     }
     slot_lines(&flashed.slots)
         .iter()
         .for_each(|line| tell.say(format_args!("{line}")));
     Ok(())
-}
-
-/// The result as JSON.
-#[derive(Serialize)]
-struct Told<'a> {
-    #[serde(flatten)]
-    flashed: &'a Flashed,
-    /// `null` for an image in f32.
-    int16: Option<&'a Int16>,
 }
 
 /// Writes `image` with a progress bar, and says what became of it.
@@ -56,12 +76,13 @@ pub(super) fn flash(
     tell: &Tell,
     interrupt: &Interrupt,
 ) -> Result<Flashed> {
+    let bridge = link.address().clone();
     let mut progress = Progress::start("flash", image.len() as u64, false);
     let flashed = link
         .flash(image, interrupt, &mut |done| {
             progress.at(done.into(), || "bytes".to_owned());
         })
-        .map_err(Failure::from)?;
+        .map_err(|error| error.at(&bridge))?;
     let took = progress.finish();
     if flashed.resumed_at > 0 {
         tell.say(format_args!(

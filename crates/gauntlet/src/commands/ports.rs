@@ -1,28 +1,43 @@
 //! `gauntlet ports`: the serial ports of this machine.
 
 use anyhow::Result;
+use clap::Args;
 
-use crate::cli::Ports;
-use crate::{out, say};
+use crate::results::{self, devices};
+use crate::say;
 use host::failure::OrFail;
 use host::lines::list::{Listed, list};
+use host::next::Command;
+
+/// Options of `ports`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet ports
+  gauntlet ports --json
+
+A warning says what will go wrong with a port before you use it, and the command that helps.")]
+pub struct Ports {
+    /// Print the list as JSON.
+    #[arg(long)]
+    pub json: bool,
+}
 
 /// Lists the ports.
 ///
 /// # Errors
 /// A failure where the system does not give the list.
-pub(super) fn run(options: &Ports) -> Result<()> {
+pub(crate) fn run(options: &Ports) -> Result<()> {
     let ports = list().or_fail(
         || "the serial ports cannot be listed".to_owned(),
         "`ls /dev/tty*`",
     )?;
     if options.json {
-        return out::json(&serde_json::json!({ "ports": ports }));
+        return results::print("ports", devices::Ports { ports: &ports });
     }
     if ports.is_empty() {
-        say!(
-            "no serial port found: plug the adapter in (a virtual one: `gauntlet simulate --help`)"
-        );
+        let help = Command::gauntlet("help simulate");
+        say!("no serial port found: plug the adapter in (a virtual one: `{help}`)");
     }
     for port in &ports {
         say!("{}", describe(port));

@@ -1,17 +1,19 @@
 //! `gauntlet simulate`: virtual devices behind pseudo-terminals, or a gripper behind a TCP port, for any program that
 //! speaks to the real ones.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::Result;
+use clap::Args;
 use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::tcp::TcpHandle;
 use rig::gripper::{Family, VirtualGripper};
 use rig::pty::{Handle, PtyDevice};
 
-use crate::cli::Simulate;
+use crate::options::model_parser;
 use crate::played;
 use crate::progress::Person;
 use crate::say;
@@ -32,11 +34,44 @@ const LOOK: Duration = Duration::from_millis(20);
 const GLOVE: &str = "/tmp/glove";
 const GRIPPER: &str = "/tmp/gripper";
 
+/// Options of `simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet simulate                                                  both, at /tmp/glove and /tmp/gripper
+  gauntlet simulate --glove /tmp/glove --poses my_hand.csv
+  gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
+  gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors   (in another terminal)
+
+Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
+ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
+takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
+The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves. \
+Runs until interrupted (Ctrl-C) and takes the links away.")]
+pub struct Simulate {
+    /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
+    #[arg(long, value_name = "PATH")]
+    pub glove: Option<PathBuf>,
+    /// Link the virtual gripper here, or let it listen at tcp:HOST:PORT.
+    #[arg(long, value_name = "PATH")]
+    pub gripper: Option<PathBuf>,
+    /// Which gripper it is; the 3-Finger if not said.
+    #[arg(long, value_name = "MODEL", value_parser = model_parser())]
+    pub gripper_model: Option<Model>,
+    /// The glove plays this recording of a hand instead of generated motion.
+    #[arg(long, value_name = "FILE.csv")]
+    pub poses: Option<PathBuf>,
+    /// Seed of the generated motion.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
 /// Runs until interrupted.
 ///
 /// # Errors
 /// A failure where a link cannot be made or a device does not answer, or an option belongs to a device that is not made.
-pub(super) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     let [glove_place, gripper_place] = places(options)?;
     let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
     let motion = Motion::open(options.poses.as_deref(), options.seed, &Person)?;
@@ -162,12 +197,19 @@ pub(super) fn family(model: Model) -> Family {
 fn spawn(device: Box<dyn Device>, link: &Path) -> Result<Handle> {
     let spawned = realtime::starting(|| PtyDevice::spawn(device, Some(link)));
     spawned.and_then(|(handle, _)| handle).map_err(|error| {
-        // The rig's texts end with the next step after their last colon.
-        let text = error.to_string();
-        let (what, next) = text.rsplit_once(": ").unwrap_or((
-            &text,
-            "a path that does not exist yet, in a folder that you may write to",
-        ));
+        let (what, next) = match error.kind() {
+            ErrorKind::AlreadyExists => (
+                format!(
+                    "{} exists and is not a dead link to a terminal",
+                    link.display()
+                ),
+                "choose another path or remove it",
+            ),
+            _ => (
+                error.to_string(),
+                "a path that does not exist yet, in a folder that you may write to",
+            ),
+        };
         Failure::new(format!("no virtual device there: {what}"), next).into()
     })
 }

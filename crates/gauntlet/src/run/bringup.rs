@@ -57,8 +57,8 @@ impl Run {
                 Ok(true)
             }
             Some(Try::Refused(why)) => Err(match now.is_some_and(|now| now.is_calibrated) {
-                true => kept(why).into(),
-                false => refused(why).into(),
+                true => kept(why, &self.devices).into(),
+                false => refused(why, &self.devices).into(),
             }),
             _ => Err(Failure::new(
                 "the bridge did not say how the calibration ended",

@@ -2,10 +2,11 @@
 
 use anyhow::Result;
 
+use crate::results::runs;
 use crate::tell::Tell;
 use host::failure::{Failure, with_others};
 use host::recording::Written;
-use host::session::{Ending, Stopped, Summary};
+use host::session::{Devices, Ending, Stopped, Summary};
 
 /// What is left when a run is over.
 #[derive(Debug)]
@@ -20,18 +21,25 @@ pub struct Finished {
     pub ending: Option<Ending>,
     /// The gripper was told to activate.
     pub activated: bool,
+    /// Where its devices are, for the next steps.
+    pub devices: Devices,
 }
 
 impl Finished {
     /// How the gripper was left, in words, where it is safe.
     pub fn left(&self) -> Option<&'static str> {
         let stopped = self.stopped.as_ref().ok()?;
-        stopped.judge().ok()
+        stopped.judge(&self.devices).ok()
     }
 
-    /// The same for JSON.
-    pub fn gripper(&self) -> Option<Stopped> {
-        self.stopped.as_ref().ok().copied()
+    /// All of it as data.
+    pub fn result(&self) -> runs::Run<'_> {
+        runs::Run {
+            gripper: self.stopped.as_ref().ok().copied(),
+            run: &self.summary,
+            log: self.log.as_ref(),
+            poses: None,
+        }
     }
 
     /// First how the gripper was left, then the numbers and what became of the log. Of a run that never began only the first,
@@ -86,8 +94,11 @@ impl Finished {
     /// # Errors
     /// The first of the failures; the others are told after it.
     pub fn judge_prepared<T>(self, driven: Result<T>) -> Result<T> {
-        let stopped = self.stopped.and_then(|stopped| stopped.judge().map(drop));
-        let ending = self.ending.map_or(Ok(()), Ending::judge);
+        let stopped = self
+            .stopped
+            .and_then(|stopped| stopped.judge(&self.devices).map(drop));
+        let judge = |ending: Ending| ending.judge(&self.devices);
+        let ending = self.ending.map_or(Ok(()), judge);
         let log = self.log.as_ref().map_or(Ok(()), Written::judge);
         first_failure(stopped, driven, [ending, log])
     }
@@ -141,6 +152,7 @@ mod tests {
             stopped,
             ending,
             activated: false,
+            devices: Devices::Unknown,
         }
     }
 

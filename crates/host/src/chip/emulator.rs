@@ -200,7 +200,7 @@ impl Emulator {
                         return Err(Failure::interrupted("while the emulator started").into());
                     }
                 }
-                Err(error) => return Err(Failure::from(error).into()),
+                Err(error) => return Err(error.at(&self.address()).into()),
             }
         }
     }

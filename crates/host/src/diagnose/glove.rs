@@ -12,12 +12,12 @@ use glove::scan::Health;
 
 use super::Findings;
 use super::answer::Came;
-use super::place::quoted;
 use super::search::{UNIT, persist};
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
+use crate::next::{Command, advice};
 use bridge_line::{UNKEPT_NEXT, ask, nobody, survey, unkept};
 
 /// The SC18IM's speed after power-on.
@@ -55,13 +55,13 @@ pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
 pub fn no_glove(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
     let mut findings = Findings::default();
     let found = find(path, &[BAUD, RESET_BAUD], &mut findings, interrupt);
-    let doctor = format!("`gauntlet doctor --glove {}`", quoted(path));
+    let doctor = Command::gauntlet("doctor").path("--glove", path);
     match findings.first_wrong() {
         Some(wrong) => {
             let next = wrong.next.clone().unwrap_or_default();
             Failure::new(
                 format!("{what}: {}", wrong.what),
-                format!("{next}; then {doctor}"),
+                next.then("; then ").then(doctor),
             )
         }
         None if found.is_some() => {
@@ -144,7 +144,9 @@ fn find(
         findings.wrong(
             "bridge",
             "this is the gripper's port: a Modbus status comes, no glove",
-            "the other port for --glove (`gauntlet ports`)",
+            advice("the other port for --glove (")
+                .then(Command::gauntlet("ports"))
+                .then(")"),
         );
     } else {
         nobody(&seen, findings);
@@ -179,7 +181,7 @@ fn bridge(baud: u32, status: u8, findings: &mut Findings) {
         RESET_BAUD => findings.note(
             "bridge",
             format!("{what}, as after power-on"),
-            "nothing: `gauntlet teleop` switches it to 115200",
+            "nothing: `teleop` switches it to 115200",
         ),
         _ => findings.wrong(
             "bridge",

@@ -10,6 +10,7 @@ use gripper::registers::Kind;
 use gripper::{Activation, Event, Fault, Gripper, Status};
 
 use super::answer::Came;
+use super::cure::cure;
 use super::glove::glove_answers;
 use super::place::{Asked, Place, kind_of};
 use super::raw::{hex, text};
@@ -23,6 +24,7 @@ use crate::lines::Line;
 use crate::lines::Pc;
 use crate::lines::port::{BAUD, Port};
 use crate::lines::{list, tcp};
+use crate::next::{Command, NextStep, advice};
 
 /// For an answer to a longer read, where answers are not late.
 const WAIT: Duration = Duration::from_millis(80);
@@ -123,7 +125,9 @@ fn unanswered(
         return findings.wrong(
             "line",
             "this is the glove's port: its serial bridge (SC18IM) answers, no gripper",
-            "the other port for --gripper (`gauntlet ports`)",
+            advice("the other port for --gripper (")
+                .then(Command::gauntlet("ports"))
+                .then(")"),
         );
     }
     let outcome = match instead {
@@ -140,7 +144,7 @@ fn unanswered(
         Outcome::Nobody(_) => {
             let tried = format!("asked unit {unit} at {baud} baud");
             let doctor = place.command("doctor");
-            nobody(&instead, tally.unasked(), &tried, Some(&doctor), findings);
+            nobody(&instead, tally.unasked(), &tried, Some(doctor), findings);
         }
         Outcome::Interrupted => interrupted(findings),
     }
@@ -184,17 +188,16 @@ fn elsewhere(place: &Place<'_>, found: Found, findings: &mut Findings, interrupt
     let Found { baud, unit } = found;
     let (asked_baud, asked_unit) = (place.baud(), place.unit());
     let there = place.with_baud(baud).with_unit(unit);
-    let next = format!(
-        "{}, or set unit {asked_unit} and {asked_baud} baud in the maker's tool",
-        there.command("gripper status")
-    );
+    let next = there.command("gripper status").then(format!(
+        ", or set unit {asked_unit} and {asked_baud} baud in the maker's tool"
+    ));
     if baud != asked_baud {
         let what = format!("it answers at {baud} baud, not at {asked_baud}");
-        findings.wrong("line", what, &next);
+        findings.wrong("line", what, next.clone());
     }
     if unit != asked_unit {
         let what = format!("unit {unit} answers at {baud} baud, not unit {asked_unit}");
-        findings.wrong("unit", what, &next);
+        findings.wrong("unit", what, next);
     }
     match Port::open(place.path, baud) {
         Ok(mut port) => {
@@ -227,8 +230,14 @@ fn tried(place: &Place<'_>, searched: &[u32]) -> String {
 }
 
 /// Nothing that is known came. `doctor`: the command that looks further.
-fn nobody(came: &Came, unasked: &[u8], tried: &str, doctor: Option<&str>, findings: &mut Findings) {
-    let further = doctor.map_or_else(String::new, |doctor| format!("; then {doctor}"));
+fn nobody(
+    came: &Came,
+    unasked: &[u8],
+    tried: &str,
+    doctor: Option<Command>,
+    findings: &mut Findings,
+) {
+    let further = doctor.map_or_else(NextStep::default, |doctor| advice("; then ").then(doctor));
     let (what, next) = match came {
         Came::Noise(_) if !unasked.is_empty() => (
             format!(
@@ -236,7 +245,9 @@ fn nobody(came: &Came, unasked: &[u8], tried: &str, doctor: Option<&str>, findin
                 unasked.len(),
                 sample_of(unasked)
             ),
-            "whether this is the gripper's port (`gauntlet ports`): something that talks by itself is on it",
+            advice("whether this is the gripper's port (")
+                .then(Command::gauntlet("ports"))
+                .then("): something that talks by itself is on it"),
         ),
         Came::Noise(bytes) => (
             format!(
@@ -244,19 +255,22 @@ fn nobody(came: &Came, unasked: &[u8], tried: &str, doctor: Option<&str>, findin
                 bytes.len(),
                 sample_of(bytes)
             ),
-            "whether this is the gripper's port and not the glove's; RS-485 A against B, ground and termination",
+            "whether this is the gripper's port and not the glove's; RS-485 A against B, ground and termination".into(),
         ),
         Came::Echo => (
             format!("only the adapter's own echo comes back; {tried}"),
-            "the gripper's 24 V supply, and RS-485 A against B",
+            "the gripper's 24 V supply, and RS-485 A against B".into(),
         ),
         _ => (
             format!("no byte comes; {tried}"),
-            "the gripper's 24 V supply, RS-485 A against B, and whether this is the gripper's port, not the glove's \
-             (`gauntlet ports`)",
+            advice(
+                "the gripper's 24 V supply, RS-485 A against B, and whether this is the gripper's port, not the glove's (",
+            )
+            .then(Command::gauntlet("ports"))
+            .then(")"),
         ),
     };
-    findings.wrong("line", what, format!("{next}{further}"));
+    findings.wrong("line", what, next.then(further));
 }
 
 fn sample_of(bytes: &[u8]) -> String {
@@ -416,7 +430,7 @@ pub(super) fn says<const X: usize>(
         fault => findings.wrong(
             "gripper",
             format!("{name}, fault {:02X}: {}", fault.code(), fault.sentence()),
-            format!("{} {}", fault.action(), cure(fault, place)).trim(),
+            cure(fault, |verb| place.command(verb)),
         ),
     }
     let what = format!("it is {}", crate::words::activation(status.activation));
@@ -425,26 +439,10 @@ pub(super) fn says<const X: usize>(
         Activation::Reset => findings.note(
             "gripper",
             what,
-            format!("{}: the fingers move", place.command("gripper activate")),
+            place.command("gripper activate").then(": the fingers move"),
         ),
         Activation::Activating | Activation::ChangingMode => {
             findings.note("gripper", what, "waiting until it is done");
         }
-    }
-}
-
-/// The command for what a fault's action asks for.
-fn cure(fault: Fault, place: &Place<'_>) -> String {
-    let action = fault.action();
-    if action.contains("eset and activate") {
-        let (reset, activate) = (
-            place.command("gripper reset"),
-            place.command("gripper activate"),
-        );
-        format!("({reset}, then {activate}: it lets go, then its fingers move)")
-    } else if action.starts_with("Activate it") {
-        format!("({})", place.command("gripper activate"))
-    } else {
-        String::new()
     }
 }

@@ -3,6 +3,7 @@
 mod frames;
 mod wire;
 
+use std::path::Path;
 use std::time::Duration;
 
 use gripper::driver::ThreeFinger;
@@ -17,6 +18,7 @@ use crate::interrupt::Interrupt;
 use crate::lines::Line;
 use crate::lines::Pc;
 use crate::lines::tcp;
+use crate::next::{Command, NextStep, advice};
 use frames::{Came, READ_HOLDING, READ_INPUT};
 use wire::{Exchange, Wire};
 
@@ -141,8 +143,8 @@ impl Tally {
                     first.number,
                     first.asked_number
                 ),
-                "the newest firmware of the gripper or gateway; or the gripper's serial line: \
-                 `gauntlet doctor --gripper /dev/ttyUSB0`",
+                advice("the newest firmware of the gripper or gateway; or the gripper's serial line: ")
+                    .then(serial_line()),
             );
         }
         let trailed = with(&|exchange| !exchange.rest.is_empty());
@@ -176,9 +178,11 @@ impl Tally {
         let count = others.iter().filter(|unit| **unit != place.unit()).count();
         let again = wire.ask(other, READ_INPUT, WAIT_UNIT, interrupt);
         let next = if again.came.is_answer() && again.unit == other {
-            place.with_unit(other).command("gripper status")
+            place.with_unit(other).command("gripper status").into()
         } else {
-            "the newest firmware of the gripper or gateway: an answer carries the unit of its question".to_owned()
+            advice(
+                "the newest firmware of the gripper or gateway: an answer carries the unit of its question",
+            )
         };
         let what = format!(
             "{count} of {} answers say that they come from unit {other}, not from unit {}",
@@ -204,7 +208,7 @@ impl Tally {
             patience.as_millis()
         );
         let next = place.with_patience(needed).command("gripper status");
-        let next = format!("{next} (`teleop` takes --patience too); a network without the delay");
+        let next = next.then(" (`teleop` takes --patience too); a network without the delay");
         if *middle <= patience {
             findings.note("connection", what, next);
             return None;
@@ -267,8 +271,8 @@ fn unanswered(
     };
     let next = match instead {
         Came::Silence | Came::Exception(_) | Came::Closed => busy(address, &instead),
-        Came::Late => "a way to the gripper without that delay: Gauntlet waits for 1.2 s at most (--patience 1000)".to_owned(),
-        _ => "whether this address and port belong to the gripper (192.168.1.11, port 502 as delivered)".to_owned(),
+        Came::Late => "a way to the gripper without that delay: Gauntlet waits for 1.2 s at most (--patience 1000)".into(),
+        _ => "whether this address and port belong to the gripper (192.168.1.11, port 502 as delivered)".into(),
     };
     findings.wrong("gripper", what, next);
 }
@@ -304,7 +308,7 @@ fn answers_otherwise(
             "unit",
             "function 03 is answered, function 04 is not: no 3-Finger gripper with Modbus TCP, perhaps a gateway to a \
              serial one",
-            "the gripper's serial line: `gauntlet doctor --gripper /dev/ttyUSB0`",
+            advice("the gripper's serial line: ").then(serial_line()),
         );
         return true;
     }
@@ -314,25 +318,37 @@ fn answers_otherwise(
         findings.wrong(
             "connection",
             "Modbus RTU answers inside TCP: this is a serial device server that passes bytes, no Modbus TCP",
-            format!(
-                "its setting for Modbus TCP; or `socat pty,link=/tmp/gripper,raw,echo=0 tcp:{}:{}`, and then \
-                 `gauntlet doctor --gripper /tmp/gripper`",
-                address.host, address.port
-            ),
+            advice("its setting for Modbus TCP; or ")
+                .then(
+                    Command::program("socat")
+                        .word("pty,link=/tmp/gripper,raw,echo=0")
+                        .word(format!("tcp:{}:{}", address.host, address.port)),
+                )
+                .then(", and then ")
+                .then(Command::gauntlet("doctor").path("--gripper", Path::new("/tmp/gripper"))),
         );
     }
     is_serial
 }
 
+/// A gripper on a serial port of this machine, whichever it is.
+fn serial_line() -> Command {
+    Command::gauntlet("doctor").path("--gripper", Path::new("/dev/ttyUSB0"))
+}
+
 /// What to try where it accepts and says nothing.
-fn busy(address: &tcp::Address, instead: &Came) -> String {
+fn busy(address: &tcp::Address, instead: &Came) -> NextStep {
     match instead {
-        Came::Exception(_) => "--unit, and whether this is a 3-Finger gripper".to_owned(),
-        _ => format!(
-            "ending other programs that are connected to it (`ss -tnp dst {}` shows those of this machine): it may serve \
-             one at a time; then its power and its network settings",
-            address.host
-        ),
+        Came::Exception(_) => "--unit, and whether this is a 3-Finger gripper".into(),
+        _ => advice("ending other programs that are connected to it (")
+            .then(
+                Command::program("ss")
+                    .option("-tnp", "dst")
+                    .word(&address.host),
+            )
+            .then(
+                " shows those of this machine): it may serve one at a time; then its power and its network settings",
+            ),
     }
 }
 

@@ -10,6 +10,7 @@ use super::search::UNIT;
 use crate::lines::port::BAUD;
 use crate::lines::tcp;
 use crate::lines::{MOST_PATIENCE, Model, Settings};
+use crate::next::Command;
 use crate::report::Reporter;
 
 /// What differs from a gripper as delivered, as far as a person knows.
@@ -86,32 +87,12 @@ impl Place<'_> {
         self
     }
 
-    /// A command that a person can paste, between backticks.
-    pub fn command(&self, verb: &str) -> String {
-        format!("`gauntlet {verb} {}`", self.options())
-    }
-
-    fn options(&self) -> String {
-        let settings = &self.asked.settings;
-        let mut words = format!("--gripper {}", quoted(self.path));
-        if let Some(baud) = settings.baud.filter(|baud| *baud != BAUD) {
-            words.push_str(&format!(" --baud {baud}"));
-        }
-        let usual = if self.is_network() { tcp::UNIT } else { UNIT };
-        if let Some(unit) = settings.unit.filter(|unit| *unit != usual) {
-            words.push_str(&format!(" --unit {unit}"));
-        }
-        let special = self
-            .asked
-            .model
-            .filter(|model| *model != Model::ThreeFinger);
-        if let Some(model) = special {
-            words.push_str(&format!(" --gripper-model {}", model.option()));
-        }
-        if let Some(patience) = settings.patience {
-            words.push_str(&format!(" --patience {}", patience.as_millis()));
-        }
-        words
+    /// A command for this place.
+    pub fn command(&self, verb: &str) -> Command {
+        let model = self.asked.model.unwrap_or(Model::ThreeFinger);
+        self.asked
+            .settings
+            .named_in(Command::gauntlet(verb), self.path, model)
     }
 }
 
@@ -121,16 +102,6 @@ pub fn kind_of(model: Model) -> Kind {
         None => Kind::ThreeFinger,
         Some(_) => Kind::TwoFinger,
     }
-}
-
-/// A path as a shell takes it.
-pub fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-:+,@%=".contains(c);
-    if !text.is_empty() && text.chars().all(plain) {
-        return text;
-    }
-    format!("'{}'", text.replace('\'', r"'\''"))
 }
 
 #[cfg(test)]
@@ -143,10 +114,10 @@ mod tests {
             path: Path::new("/dev/ttyUSB1"),
             asked: Asked::default(),
         };
-        let command = |place: Place<'_>| place.command("gripper status");
+        let command = |place: Place<'_>| place.command("gripper status").to_string();
         assert_eq!(
             command(place),
-            "`gauntlet gripper status --gripper /dev/ttyUSB1`"
+            "gauntlet gripper status --gripper /dev/ttyUSB1"
         );
         assert_eq!(
             command(
@@ -155,12 +126,11 @@ mod tests {
                     .with_unit(5)
                     .with_kind(Kind::TwoFinger)
             ),
-            "`gauntlet gripper status --gripper /dev/ttyUSB1 --baud 57600 --unit 5 --gripper-model 2f85`"
+            "gauntlet gripper status --gripper /dev/ttyUSB1 --baud 57600 --unit 5 --gripper-model 2f85"
         );
         assert_eq!(
             command(place.with_unit(9).with_patience(Duration::from_millis(60))),
-            "`gauntlet gripper status --gripper /dev/ttyUSB1 --patience 60`"
+            "gauntlet gripper status --gripper /dev/ttyUSB1 --patience 60"
         );
-        assert_eq!(quoted(Path::new("/tmp/my port's")), r"'/tmp/my port'\''s'");
     }
 }

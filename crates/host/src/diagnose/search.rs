@@ -13,12 +13,11 @@ use super::Place;
 use super::answer::Came;
 use super::serial::exchange;
 use crate::interrupt::Interrupt;
+pub use crate::lines::UNIT;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
 use crate::report::{Nobody, Reporter};
 
-/// Unit as delivered.
-pub const UNIT: u8 = 9;
 /// Unit numbers a device can have.
 const UNITS: std::ops::RangeInclusive<u8> = 1..=247;
 /// Speeds a Robotiq gripper can be set to, the usual one left out.

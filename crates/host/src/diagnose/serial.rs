@@ -251,9 +251,8 @@ impl Tally {
             patience.as_millis()
         );
         let next = place.with_patience(needed).command("gripper status");
-        let next = format!(
-            "{next} (`teleop` takes --patience too); an adapter or a tunnel without the delay"
-        );
+        let next =
+            next.then(" (`teleop` takes --patience too); an adapter or a tunnel without the delay");
         if middle <= patience {
             findings.note("line", what, next);
             return None;

@@ -55,14 +55,8 @@ pub fn list() -> Result<Vec<Listed>, serialport::Error> {
 /// `root` is `/`, but for tests.
 fn describe(path: PathBuf, port_type: SerialPortType, root: &Path) -> Listed {
     let latency_timer_ms = latency_timer(&path, root);
-    let mut warnings = Vec::new();
-    if let Some(ms) = latency_timer_ms.filter(|ms| *ms > LATENCY_TIMER_MS) {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        warnings.push(format!(
-            "its latency timer is {ms} ms, which slows the glove to a few scans a second: \
-             `echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer`"
-        ));
-    }
+    let fault = latency_timer_ms.and_then(|ms| fault_of(&path, ms));
+    let warnings: Vec<String> = fault.map(warning).into_iter().collect();
     let stable_path = stable_path(&path, root);
     let usb = match port_type {
         SerialPortType::UsbPort(usb) => Some(usb),
@@ -126,17 +120,28 @@ fn stable_path(path: &Path, root: &Path) -> Option<PathBuf> {
 
 /// The warning about `path`'s latency timer, for commands that open a port.
 pub fn latency_warning(path: &Path) -> Option<String> {
-    let real = std::fs::canonicalize(path).ok()?;
-    describe(real, SerialPortType::Unknown, Path::new("/"))
-        .warnings
-        .pop()
+    latency_fault(path).map(warning)
 }
 
 /// The same as what is wrong, and the command that helps.
 pub fn latency_fault(path: &Path) -> Option<(String, String)> {
-    let warning = latency_warning(path)?;
-    let (what, command) = warning.split_once(": `")?;
-    Some((what.to_owned(), format!("`{command}")))
+    let real = std::fs::canonicalize(path).ok()?;
+    fault_of(&real, latency_timer(&real, Path::new("/"))?)
+}
+
+fn warning((what, next): (String, String)) -> String {
+    format!("{what}: {next}")
+}
+
+/// What is wrong with a latency timer of `ms`, and the command that helps.
+fn fault_of(path: &Path, ms: u32) -> Option<(String, String)> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    (ms > LATENCY_TIMER_MS).then(|| {
+        (
+            format!("its latency timer is {ms} ms, which slows the glove to a few scans a second"),
+            format!("`echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer`"),
+        )
+    })
 }
 
 #[cfg(test)]

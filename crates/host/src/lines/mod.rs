@@ -17,7 +17,11 @@ use anyhow::Result;
 use crate::clock::ticks;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::next::{Command, advice};
 use port::{BAUD, Watch};
+
+/// Modbus unit of a gripper on a serial line, as delivered.
+pub const UNIT: u8 = 9;
 
 /// What differs from a gripper as it is delivered.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -60,10 +64,32 @@ impl Settings {
             )),
             (None, _, Some(unit @ (0 | 248..))) => Err(Failure::usage(
                 format!("--unit {unit}: a serial line has units 1 to 247"),
-                "the unit that `gauntlet doctor` finds",
+                advice("the unit that ")
+                    .then(Command::gauntlet("doctor").path("--gripper", path))
+                    .then(" finds"),
             )),
             _ => Ok(()),
         }
+    }
+
+    /// `command` for the gripper at `path`: only what differs from one as delivered is said.
+    pub fn named_in(&self, command: Command, path: &Path, model: Model) -> Command {
+        let is_network = matches!(tcp::Address::parse(path), Ok(Some(_)));
+        let usual = if is_network { tcp::UNIT } else { UNIT };
+        let mut command = command.path("--gripper", path);
+        if let Some(baud) = self.baud.filter(|baud| *baud != BAUD) {
+            command = command.option("--baud", baud);
+        }
+        if let Some(unit) = self.unit.filter(|unit| *unit != usual) {
+            command = command.option("--unit", unit);
+        }
+        if model != Model::ThreeFinger {
+            command = command.option("--gripper-model", model.option());
+        }
+        if let Some(patience) = self.patience {
+            command = command.option("--patience", patience.as_millis());
+        }
+        command
     }
 
     /// The patience asked for; none where it was not.

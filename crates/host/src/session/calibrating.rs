@@ -3,25 +3,27 @@
 use bridge::calibration::{CalibrationState, Refusal, Try};
 use bridge::event::Kind;
 
+use super::devices::{Devices, and};
 use crate::failure::Failure;
+use crate::next::NextStep;
 
 /// Why the hand was not taken, and what helps.
-pub fn refused(why: Refusal) -> Failure {
+pub fn refused(why: Refusal, devices: &Devices) -> Failure {
     let why_words = words(why);
     Failure::new(
         format!("the glove was not calibrated: {why_words}"),
-        next(why),
+        next(why, devices),
     )
 }
 
 /// The same where a calibration from before stays in use.
-pub fn kept(why: Refusal) -> Failure {
+pub fn kept(why: Refusal, devices: &Devices) -> Failure {
     let what = Kind::Calibration(Try::Refused(why));
     let state = CalibrationState {
         is_calibrated: true,
         ..CalibrationState::default()
     };
-    Failure::new(told(&what, &state), next(why))
+    Failure::new(told(&what, &state), next(why, devices))
 }
 
 /// What happened, in words that know which calibration is in use.
@@ -46,20 +48,29 @@ fn words(why: Refusal) -> String {
     }
 }
 
-fn next(why: Refusal) -> &'static str {
+fn next(why: Refusal, devices: &Devices) -> NextStep {
     match why {
         Refusal::NoFrames => {
-            "the glove's cable and power; `gauntlet doctor` says which layer fails"
+            let says = if matches!(devices, Devices::Here { .. }) {
+                " says which layer fails"
+            } else {
+                ""
+            };
+            and("the glove's cable and power", devices.glove(), says)
         }
-        Refusal::Missing(_) => "the cables of these sensors, and their power",
+        Refusal::Missing(_) => "the cables of these sensors, and their power".into(),
         Refusal::Moving { .. } | Refusal::TooShort { .. } => {
-            "the same again, the hand resting on a table until it says done"
+            "the same again, the hand resting on a table until it says done".into()
         }
-        Refusal::Bent { .. } => "the same again, the palm on a table and the fingers stretched",
-        Refusal::Engaged => {
-            "`gauntlet bridge release --bridge PORT` with its port, where another host left it closed; in the view space opens it"
+        Refusal::Bent { .. } => {
+            "the same again, the palm on a table and the fingers stretched".into()
         }
-        Refusal::NothingBefore => "calibrating on a flat hand",
+        Refusal::Engaged => and(
+            "in the view space opens it",
+            devices.bridge("bridge release"),
+            " where another host left it closed",
+        ),
+        Refusal::NothingBefore => "calibrating on a flat hand".into(),
     }
 }
 
@@ -85,12 +96,13 @@ mod tests {
         assert!(with.contains("index_proximal"), "{with}");
         assert!(!with.contains("not calibrated"), "{with}");
         assert!(without.starts_with("not calibrated: "), "{without}");
-        assert!(!kept(moving).to_string().contains("not calibrated"));
+        let kept = kept(moving, &Devices::Unknown).to_string();
+        assert!(!kept.contains("not calibrated"), "{kept}");
     }
 
     #[test]
     fn what_is_to_be_opened_first_is_named_with_its_key() {
-        let told = refused(Refusal::Engaged).to_string();
+        let told = refused(Refusal::Engaged, &Devices::Unknown).to_string();
         assert!(
             told.contains("(space)") && !told.contains("release"),
             "{told}"

@@ -3,8 +3,10 @@
 use anyhow::Result;
 use bridge::{HoldReason, State};
 
+use super::devices::{Devices, and};
 use super::driven::Driven;
 use crate::failure::Failure;
+use crate::next::{Command, NextStep};
 use crate::realtime;
 use crate::stats::seconds;
 
@@ -49,20 +51,28 @@ impl Ending {
     ///
     /// # Errors
     /// What was broken.
-    pub fn judge(self) -> Result<()> {
-        let broken = self.broken().or_else(|| self.held_at_end());
-        match broken.or_else(|| self.held_through()) {
+    pub fn judge(self, devices: &Devices) -> Result<()> {
+        let broken = self.broken(devices);
+        let held = || {
+            self.held_at_end(devices)
+                .or_else(|| self.held_through(devices))
+        };
+        match broken.or_else(held) {
             Some(failure) => Err(failure.into()),
             None => Ok(()),
         }
     }
 
     /// A device, or the clutch.
-    fn broken(&self) -> Option<Failure> {
+    fn broken(&self, devices: &Devices) -> Option<Failure> {
         if matches!(self.state, State::Faulted(_)) {
             return Some(Failure::new(
                 format!("the run ended {}", self.state),
-                "`gauntlet gripper status --gripper PORT` with its port, which says what to do",
+                and(
+                    "",
+                    devices.gripper("gripper status"),
+                    ", which says what to do",
+                ),
             ));
         }
         if self.driver.expired && !self.driver.attended {
@@ -71,50 +81,58 @@ impl Ending {
         if !self.gripper_answers {
             return Some(Failure::new(
                 "the gripper no longer answers",
-                "its cable and its 24 V supply; `gauntlet doctor --gripper PORT` with its port",
+                silent(devices),
             ));
         }
         if let Some(what) = &self.disobeyed {
-            return Some(Failure::new(
-                what,
-                "what holds its fingers, its emergency stop and its 24 V supply; `gauntlet gripper move --gripper PORT --to 100` \
-                 with its port, which moves it without a glove",
-            ));
+            let holds = "what holds its fingers, its emergency stop and its 24 V supply";
+            let next = match devices {
+                Devices::Here { .. } => {
+                    let moved = devices.gripper("gripper move --to 100");
+                    and(holds, moved, ", which moves it without a glove")
+                }
+                Devices::Unknown | Devices::Chip(_) => and(holds, devices.gripper(""), ""),
+            };
+            return Some(Failure::new(what, next));
         }
         if !self.glove_answers {
             return Some(Failure::new(
                 "the glove no longer sends frames",
-                "its cable and power; `gauntlet doctor --glove PORT` with its port",
+                and("its cable and power", devices.glove(), ""),
             ));
         }
         self.useless.as_ref().map(|why| {
             Failure::new(
                 format!("the glove sends frames that cannot be used: {why}"),
-                "`gauntlet doctor --glove PORT` with its port, which names each sensor; calibrating again after it",
+                and(
+                    "",
+                    devices.glove(),
+                    ", which names each sensor; calibrating again after it",
+                ),
             )
         })
     }
 
     /// It ended held: by the glove's fault, or by whatever it was with nobody there to mend it.
-    fn held_at_end(&self) -> Option<Failure> {
+    fn held_at_end(&self, devices: &Devices) -> Option<Failure> {
         let reason = self.held?;
         let counts = !self.driver.attended || mends(reason) == Mends::Glove;
         counts.then(|| {
             Failure::new(
                 format!("the run ended held: {reason}"),
-                self.next_step(reason),
+                self.next_step(reason, devices),
             )
         })
     }
 
     /// It never followed although it was to, or was held for most of the time.
-    fn held_through(&self) -> Option<Failure> {
+    fn held_through(&self, devices: &Devices) -> Option<Failure> {
         let driven = &self.driven;
         if self.driver.engages && !driven.followed() {
             return Some(match driven.reason() {
                 Some(reason) => Failure::new(
                     format!("the gripper never followed the hand: {reason}"),
-                    self.next_step(reason),
+                    self.next_step(reason, devices),
                 ),
                 None => Failure::new(
                     "the gripper never followed the hand: the run ended, or another host opened the clutch, before it could",
@@ -134,32 +152,42 @@ impl Ending {
                 seconds(held),
                 seconds(held + driven.moving()),
             ),
-            self.next_step(reason),
+            self.next_step(reason, devices),
         ))
     }
 
-    fn next_step(&self, reason: HoldReason) -> &'static str {
+    fn next_step(&self, reason: HoldReason, devices: &Devices) -> NextStep {
         match mends(reason) {
-            Mends::Computer => realtime::LESS_TO_DO,
+            Mends::Computer => realtime::LESS_TO_DO.into(),
             // What waits in a busy computer grows old there.
             Mends::Glove | Mends::Gripper if self.too_busy && grows_old(reason) => {
-                realtime::LESS_TO_DO
+                realtime::LESS_TO_DO.into()
             }
-            Mends::Glove => "`gauntlet doctor --glove PORT` with its port",
-            Mends::Gripper => {
-                "its cable and its 24 V supply; `gauntlet doctor --gripper PORT` with its port"
+            Mends::Glove => and("", devices.glove(), ""),
+            Mends::Gripper => silent(devices),
+            Mends::Map => "a map that was trained on this hand's whole range of motion".into(),
+            Mends::Store => and(
+                "waiting until another host has written its weights",
+                devices.bridge("bridge status"),
+                ", which says what is written",
+            ),
+            Mends::Weights => and("", devices.bridge("flash MODEL"), " with a trained model"),
+            Mends::Activation => {
+                NextStep::same(Command::more().word("--activate")).then(": the fingers will move")
             }
-            Mends::Map => "a map that was trained on this hand's whole range of motion",
-            Mends::Store => {
-                "`gauntlet bridge status --bridge PORT` with its port, which says what is written and by whom"
-            }
-            Mends::Weights => "`gauntlet flash MODEL --bridge PORT` with its port",
-            Mends::Activation => "--activate: the fingers will move",
-            Mends::Calibration => {
-                "--calibrate-flat, and the hand flat and still until it says done"
-            }
+            Mends::Calibration => NextStep::same(Command::more().word("--calibrate-flat"))
+                .then(", and the hand flat and still until it says done"),
         }
     }
+}
+
+/// What helps against a gripper that does not answer.
+fn silent(devices: &Devices) -> NextStep {
+    and(
+        "its cable and its 24 V supply",
+        devices.gripper("doctor"),
+        "",
+    )
 }
 
 /// What a hold needs, to be over.

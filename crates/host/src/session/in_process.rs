@@ -19,10 +19,11 @@ use super::slots::MemorySlot;
 use super::stopped::Stopped;
 use super::worker::{PcApp, Worker};
 use crate::clock::Clock;
-use crate::failure::{Failure, OrFail, told};
+use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 use crate::lines::port::{BAUD, Port, Watch};
 use crate::lines::{Line, Model, Pc, Settings};
+use crate::next::{Command, advice};
 use crate::realtime::{self, Scheduling};
 
 /// What a session is made of.
@@ -83,7 +84,8 @@ impl InProcess {
             side: parts.side,
             ..bridge::Settings::default()
         };
-        let config = bridge::Config::new(settings).map_err(told)?;
+        let config = bridge::Config::new(settings)
+            .or_fail(|| "the bridge's settings".to_owned(), "others")?;
         let (orders, queue) = Orders::queue(clock);
         let hub = Hub::default();
         let ports = [
@@ -192,15 +194,14 @@ pub fn check_image(image: &[u8], model: Model) -> Result<()> {
 }
 
 fn other_shape(outputs: usize, model: Model) -> Failure {
-    let next = match outputs {
+    let other = match outputs {
         1 => {
-            "the same with --gripper-model 2f85, 2f140 or hande, if it is one of these; else a map for it: `gauntlet train --help`"
+            "the same with --gripper-model 2f85, 2f140 or hande, if it is one of these; else a map for it: "
         }
-        4 => {
-            "the same with --gripper-model 3f, if it is the 3-Finger; else a map for it: `gauntlet train --help`"
-        }
-        _ => "a map for this gripper: `gauntlet train --help`",
+        4 => "the same with --gripper-model 3f, if it is the 3-Finger; else a map for it: ",
+        _ => "a map for this gripper: ",
     };
+    let next = advice(other).then(Command::gauntlet("help train"));
     Failure::new(
         format!(
             "the map gives {outputs} position{}, and the {} has {} ax{}s",

@@ -16,6 +16,7 @@ pub mod axes;
 mod calibrating;
 mod chip_stop;
 mod chip_worker;
+mod devices;
 mod driven;
 mod ending;
 mod hub;
@@ -38,6 +39,7 @@ mod summary;
 mod worker;
 
 pub use calibrating::{kept, refused};
+pub use devices::Devices;
 pub use driven::Driven;
 pub use ending::{Driver, Ending};
 pub use hub::{Happened, Hub};

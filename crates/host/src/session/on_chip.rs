@@ -14,9 +14,9 @@ use super::chip_worker::{Left, Worker};
 use super::hub::Hub;
 use super::orders::{Order, Orders};
 use super::stopped::Stopped;
-use crate::chip::link::{Error, HostLink};
+use crate::chip::link::{Address, Error, HostLink};
 use crate::clock::Clock;
-use crate::failure::{Failure, OrFail};
+use crate::failure::OrFail;
 use crate::lines::port::Watch;
 use crate::realtime::Scheduling;
 
@@ -28,6 +28,7 @@ pub const SAMPLE_MS: u16 = 50;
 pub struct OnChip {
     thread: Option<JoinHandle<Left>>,
     left: Option<Stopped>,
+    address: Address,
     orders: Orders,
     hub: Hub,
 }
@@ -43,14 +44,16 @@ impl OnChip {
         clock: Clock,
         samples: Option<SyncSender<Sample>>,
     ) -> Result<Self> {
-        let counters = link.counters().map_err(Failure::from)?;
-        let status = link.status().map_err(Failure::from)?;
+        let address = link.address().clone();
+        let told = |error: Error| error.at(&address);
+        let counters = link.counters().map_err(told)?;
+        let status = link.status().map_err(told)?;
         let calibration = match link.health() {
             // That of an older bridge, which only watches and is flashed, is not known.
             Err(Error::Older { .. }) => None,
-            health => Some(health.map_err(Failure::from)?.calibration),
+            health => Some(health.map_err(told)?.calibration),
         };
-        link.telemetry(SAMPLE_MS).map_err(Failure::from)?;
+        link.telemetry(SAMPLE_MS).map_err(told)?;
         let (orders, queue) = Orders::queue(clock);
         let hub = Hub::default();
         let mut worker = Worker::new(link, queue, hub.clone(), samples, status, counters);
@@ -68,6 +71,7 @@ impl OnChip {
         Ok(Self {
             thread: Some(thread),
             left: None,
+            address,
             orders,
             hub,
         })
@@ -109,7 +113,7 @@ impl Session for OnChip {
 
     fn ended(&mut self) -> anyhow::Error {
         match self.join() {
-            Some(fault) => Failure::from(fault).into(),
+            Some(fault) => fault.at(&self.address).into(),
             None => anyhow::anyhow!("the bridge ended"),
         }
     }
@@ -118,7 +122,7 @@ impl Session for OnChip {
         self.orders.give(Order::Stop);
         let fault = self.join();
         match (self.left, fault) {
-            (Some(Stopped::Untouched) | None, Some(fault)) => Err(Failure::from(fault).into()),
+            (Some(Stopped::Untouched) | None, Some(fault)) => Err(fault.at(&self.address).into()),
             (left, _) => Ok(left.unwrap_or(Stopped::Unheard)),
         }
     }

@@ -4,6 +4,7 @@ use anyhow::Result;
 use gripper::Duration;
 use serde::Serialize;
 
+use super::devices::{Devices, and};
 use crate::failure::Failure;
 
 /// The hold must be confirmed this long after the clutch opened; then the session ends whatever the gripper does.
@@ -59,7 +60,7 @@ impl Stopped {
     ///
     /// # Errors
     /// A failure where the gripper may still move.
-    pub fn judge(self) -> Result<&'static str> {
+    pub fn judge(self, devices: &Devices) -> Result<&'static str> {
         match self {
             Self::Untouched => Ok("the gripper was not commanded"),
             Self::Held => Ok("the gripper is held where it is"),
@@ -71,20 +72,31 @@ impl Stopped {
             Self::NothingWritten => Err(Failure::new(
                 "the gripper was not held: nothing is written to it, since it is not ready or what it says cannot be believed; \
                  the positions it says stayed the same for half a second",
-                "look at the gripper: an axis comes to rest at most 40 counts from where it was believed to be last; \
-                 in danger switch off its 24 V supply; `gauntlet gripper status --gripper PORT` with its port",
+                and(
+                    "look at the gripper: an axis comes to rest at most 40 counts from where it was believed to be last; \
+                     in danger switch off its 24 V supply",
+                    devices.gripper("gripper status"),
+                    "",
+                ),
             )
             .into()),
             Self::Unheard => Err(Failure::new(
                 "the bridge was heard no more while the clutch was closed: it holds the gripper by itself 250 ms after \
                  the last heartbeat, but nobody saw it",
-                "looking at the gripper; `gauntlet bridge status` says what the bridge does",
+                and(
+                    "looking at the gripper",
+                    devices.bridge("bridge status"),
+                    " says what the bridge does",
+                ),
             )
             .into()),
             Self::Restarted => Err(Failure::new(
                 "the bridge restarted while the clutch was closed: the hold was not confirmed",
-                "look at the gripper: an axis comes to rest at most 40 counts from where it was; \
-                 `gauntlet bridge status` says why the bridge started",
+                and(
+                    "look at the gripper: an axis comes to rest at most 40 counts from where it was",
+                    devices.bridge("bridge status"),
+                    " says why the bridge started",
+                ),
             )
             .into()),
             Self::NotConfirmed => Err(Failure::new(
@@ -124,9 +136,14 @@ mod tests {
             Stopped::Restarted,
             Stopped::Activating,
         ] {
-            let text = stopped.judge().unwrap_err().to_string();
+            let text = stopped.judge(&Devices::Unknown).unwrap_err().to_string();
             assert!(!text.contains("is held"), "{text}");
         }
-        assert!(Stopped::Held.judge().unwrap().contains("is held"));
+        assert!(
+            Stopped::Held
+                .judge(&Devices::Unknown)
+                .unwrap()
+                .contains("is held")
+        );
     }
 }

@@ -24,6 +24,7 @@ pub fn rounded(rate: f64) -> f64 {
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Summary {
     /// How long it took, s.
+    #[serde(rename = "took_s")]
     pub seconds: f64,
     /// Frames of the glove.
     pub glove_frames: u64,
@@ -76,6 +77,7 @@ pub struct Summary {
     /// Bytes lost in the queues of the chip's ports since it started: host, glove, gripper. On a chip only.
     pub bytes_lost: Option<[u32; 3]>,
     /// Telemetry samples that came over the line. On a chip only.
+    #[serde(rename = "telemetry_samples")]
     pub samples: Option<u64>,
 }
 
@@ -233,7 +235,7 @@ mod tests {
             object.keys().cloned().collect()
         };
         assert_eq!(names(&here), names(&chip));
-        for name in ["bytes_lost", "samples"] {
+        for name in ["bytes_lost", "telemetry_samples"] {
             assert!(here[name].is_null() && !chip[name].is_null(), "{name}");
         }
         for name in ["stalls", "scheduling", "gripper_failed"] {

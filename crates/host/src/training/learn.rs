@@ -6,11 +6,13 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use trainer::algorithm::{InUnits, Trainer};
+use trainer::remedy::Remedy;
 
 use super::told::Told;
 use super::{Course, Ended, Learned, Task};
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
+use crate::next::{Command, NextStep};
 use crate::report::Reporter;
 
 /// A state is kept so often.
@@ -110,13 +112,12 @@ enum Pause {
 }
 
 fn named(path: &Path, error: &trainer::algorithm::checkpoint::Error) -> anyhow::Error {
-    let text = error.to_string();
-    let name = path.display().to_string();
-    if text.contains(&name) {
-        told(text)
-    } else {
-        told(format!("{name}: {text}"))
-    }
+    let (text, name) = (error.to_string(), path.display().to_string());
+    let what = match text.contains(&name) {
+        true => text,
+        false => format!("{name}: {text}"),
+    };
+    Failure::new(what, error.remedy()).into()
 }
 
 fn broken_off(course: &Course, epoch: usize) -> anyhow::Error {
@@ -126,7 +127,7 @@ fn broken_off(course: &Course, epoch: usize) -> anyhow::Error {
                 "interrupted in the training, at epoch {epoch}: no model was made, the state is in {}",
                 path.display()
             ),
-            format!("the same again with --resume {}", path.display()),
+            NextStep::same(Command::more().path("--resume", path)),
         )
         .into(),
         None => Failure::interrupted(&format!(

@@ -68,7 +68,7 @@ pub fn weights(path: &Path, int16: Option<&Path>, reporter: &dyn Reporter) -> Re
                 path.display(),
                 bytes.len()
             ),
-            "a model that `gauntlet train` made",
+            "a model that `train` made",
         )
         .into());
     }
@@ -83,7 +83,7 @@ pub fn weights(path: &Path, int16: Option<&Path>, reporter: &dyn Reporter) -> Re
         // The bridge checks it too; here it costs no minutes on the line.
         return Weights::of_image(bytes).or_fail(
             || format!("the file {}", path.display()),
-            "an image that `gauntlet export` wrote, whole",
+            "an image that `export` wrote, whole",
         );
     }
     let model = hand(parsed(&bytes, path, reporter)?, path)?;
@@ -91,7 +91,7 @@ pub fn weights(path: &Path, int16: Option<&Path>, reporter: &dyn Reporter) -> Re
         None => image(&model)?,
         Some(poses) => image_int16(&model, &Motion::open(Some(poses), 0, reporter)?.frames())?,
     };
-    Weights::of_image(image).map_err(told)
+    Weights::of_image(image).or_fail(unfit, "training it again")
 }
 
 impl Weights {
@@ -170,7 +170,7 @@ fn hand(model: Model, path: &Path) -> Result<Model> {
                 path.display(),
                 bridge::HIDDEN
             ),
-            "a model that `gauntlet train` made",
+            "a model that `train` made",
         )
         .into());
     }

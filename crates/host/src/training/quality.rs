@@ -7,6 +7,8 @@ use trainer::measures::{Coverage, Test, measure, occupancy};
 use trainer::model::{Model, Normalisation};
 use trainer::spread::spread;
 
+use crate::stats::{number, number_or_null};
+
 /// What a map must reach to be worth driving a gripper with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bar {
@@ -50,10 +52,13 @@ pub const TARGETS: usize = 8000;
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Quality {
     /// Sample mean distortion (Eq. 14): how much small motions are stretched.
+    #[serde(serialize_with = "number")]
     pub mean_distortion: f64,
     /// Share of the gripper's poses the hand can reach (Eq. 16), 0 to 1.
+    #[serde(serialize_with = "number")]
     pub volume_occupancy: f64,
     /// How much farther apart neighbours come to lie (Eq. 17).
+    #[serde(serialize_with = "number")]
     pub d_knn: f64,
     /// Hand poses measured on.
     pub frames: usize,
@@ -133,12 +138,16 @@ impl Quality {
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Measured {
     /// Sample mean distortion (Eq. 14), network units.
+    #[serde(serialize_with = "number")]
     pub mean_distortion: f64,
     /// Share of the targets that are reached (Eq. 16), 0 to 1.
+    #[serde(serialize_with = "number_or_null")]
     pub volume_occupancy: Option<f64>,
     /// How much farther apart neighbours come to lie (Eq. 17), network units.
+    #[serde(serialize_with = "number")]
     pub d_knn: f64,
     /// Mean squared error over the truth's variance (Eq. 18).
+    #[serde(serialize_with = "number_or_null")]
     pub nmse: Option<f64>,
     /// Why a measure is not there.
     #[serde(skip_serializing_if = "Vec::is_empty")]

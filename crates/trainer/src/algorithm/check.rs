@@ -3,20 +3,19 @@
 use super::Settings;
 use crate::data::Matrix;
 use crate::operator;
+use crate::remedy::Remedy;
 
 /// Why there is no trained map.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// No samples, or no columns.
-    #[error("there are no {what} samples; give at least one row with at least one column")]
+    #[error("there are no {what} samples")]
     Empty {
         /// `input` or `target`.
         what: &'static str,
     },
     /// A sample is NaN or infinite.
-    #[error(
-        "{what}: row {row}, column {column} is {value}, which is not finite; remove or repair that row"
-    )]
+    #[error("{what}: row {row}, column {column} is {value}, which is not finite")]
     NotFinite {
         /// Which samples.
         what: &'static str,
@@ -28,9 +27,7 @@ pub enum Error {
         value: f32,
     },
     /// Pairs with other columns than the samples.
-    #[error(
-        "the reference pairs have {found} {what} columns, the samples {expected}; use pairs of the same domains"
-    )]
+    #[error("the reference pairs have {found} {what} columns, the samples {expected}")]
     PairColumns {
         /// `input` or `target`.
         what: &'static str,
@@ -40,9 +37,7 @@ pub enum Error {
         expected: usize,
     },
     /// Inputs and targets of the pairs differ in number.
-    #[error(
-        "the reference pairs have {inputs} inputs and {targets} targets; each input needs its target"
-    )]
+    #[error("the reference pairs have {inputs} inputs and {targets} targets")]
     PairRows {
         /// Rows of inputs.
         inputs: usize,
@@ -50,9 +45,7 @@ pub enum Error {
         targets: usize,
     },
     /// More pairs than samples.
-    #[error(
-        "{samples} input samples are too few for {pairs} reference pairs; bring more samples or ask for fewer pairs"
-    )]
+    #[error("{samples} input samples are too few for {pairs} reference pairs")]
     FewerSamplesThanPairs {
         /// Input samples.
         samples: usize,
@@ -60,15 +53,13 @@ pub enum Error {
         pairs: usize,
     },
     /// All targets are the same point.
-    #[error(
-        "all {rows} target samples are one point; there is nothing to cover: sample the target domain"
-    )]
+    #[error("all {rows} target samples are one point")]
     OnePoint {
         /// Samples.
         rows: usize,
     },
     /// No hidden units, or more samples than indices can name.
-    #[error("{what} is {value}; use {allowed}")]
+    #[error("{what} is {value}")]
     Setting {
         /// Which setting.
         what: &'static str,
@@ -78,9 +69,7 @@ pub enum Error {
         allowed: &'static str,
     },
     /// The operator showed something of another shape, or not finite.
-    #[error(
-        "the operator's answer has {found} values (finite ones), an input has {expected}; show it again"
-    )]
+    #[error("the operator's answer has {found} values (finite ones), an input has {expected}")]
     Answer {
         /// Finite values of the answer.
         found: usize,
@@ -91,16 +80,38 @@ pub enum Error {
     #[error(transparent)]
     Operator(#[from] operator::Error),
     /// The weights are no longer finite.
-    #[error(
-        "the training diverged before epoch {epoch} (a weight is not finite); use a lower learning rate or scale the samples to about ±1"
-    )]
+    #[error("the training diverged before epoch {epoch} (a weight is not finite)")]
     Diverged {
         /// Epochs done.
         epoch: usize,
     },
     /// An input that belongs to no target.
-    #[error("no pair is asked for now; show an input when one is")]
+    #[error("no pair is asked for now")]
     Unasked,
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::Empty { .. } => "give at least one row with at least one column".to_owned(),
+            Self::NotFinite { .. } => "remove or repair that row".to_owned(),
+            Self::PairColumns { .. } => "use pairs of the same domains".to_owned(),
+            Self::PairRows { .. } => "each input needs its target".to_owned(),
+            Self::FewerSamplesThanPairs { .. } => {
+                "bring more samples or ask for fewer pairs".to_owned()
+            }
+            Self::OnePoint { .. } => {
+                "there is nothing to cover: sample the target domain".to_owned()
+            }
+            Self::Setting { allowed, .. } => format!("use {allowed}"),
+            Self::Answer { .. } => "show it again".to_owned(),
+            Self::Operator(error) => error.remedy(),
+            Self::Diverged { .. } => {
+                "use a lower learning rate or scale the samples to about ±1".to_owned()
+            }
+            Self::Unasked => "show an input when one is".to_owned(),
+        }
+    }
 }
 
 /// What a person should know, though the training goes on.

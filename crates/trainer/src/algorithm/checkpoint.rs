@@ -3,6 +3,7 @@
 use super::Trainer;
 use crate::data::{Matrix, Pairs, sha256};
 use crate::optimizer::Nadam;
+use crate::remedy::Remedy;
 use crate::whole_file;
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use sha2::{Digest, Sha256};
@@ -21,7 +22,7 @@ const DIGEST: &str = "state_sha256";
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be read or written.
-    #[error("cannot {verb} the checkpoint {}: {source}; check the path and that you may use it", file.display())]
+    #[error("cannot {verb} the checkpoint {}: {source}", file.display())]
     File {
         /// `read` or `write`.
         verb: &'static str,
@@ -31,14 +32,14 @@ pub enum Error {
         source: std::io::Error,
     },
     /// Not a checkpoint, or damaged.
-    #[error("not a usable checkpoint ({why}); start the training afresh")]
+    #[error("not a usable checkpoint ({why})")]
     Broken {
         /// What is wrong with it.
         why: String,
     },
     /// Of other samples.
     #[error(
-        "the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected}); use the samples it was made with, with the same seed and share held out"
+        "the checkpoint is of another data set (its samples' SHA-256 starts {found}, these {expected})"
     )]
     OtherData {
         /// First digits in the file.
@@ -48,14 +49,28 @@ pub enum Error {
     },
     /// Of other settings.
     #[error(
-        "the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed); use those it was made with"
+        "the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed)"
     )]
     OtherSettings,
     /// Of other answers.
     #[error(
-        "the checkpoint was made with other true pairs (--truth), which answer for its reference pairs; use those it was made with"
+        "the checkpoint was made with other true pairs (--truth), which answer for its reference pairs"
     )]
     OtherAnswers,
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::File { .. } => "check the path and that you may use it".to_owned(),
+            Self::Broken { .. } => "start the training afresh".to_owned(),
+            Self::OtherData { .. } => {
+                "use the samples it was made with, with the same seed and share held out".to_owned()
+            }
+            Self::OtherSettings => "use those it was made with".to_owned(),
+            Self::OtherAnswers => "use those it was made with".to_owned(),
+        }
+    }
 }
 
 fn broken(why: impl Into<String>) -> Error {

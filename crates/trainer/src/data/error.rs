@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use crate::remedy::Remedy;
+
 /// A row of a file.
 #[derive(Clone, Debug)]
 pub struct Row {
@@ -42,7 +44,7 @@ impl core::fmt::Display for Field {
 pub enum Error {
     /// The file cannot be opened or read.
     #[error(
-        "cannot read {}: {source}; check the path and that you may read it", file.display()
+        "cannot read {}: {source}", file.display()
     )]
     Read {
         /// The file.
@@ -52,7 +54,7 @@ pub enum Error {
     },
     /// The file cannot be written.
     #[error(
-        "cannot write {}: {source}; check that the folder exists and that you may write there", file.display()
+        "cannot write {}: {source}", file.display()
     )]
     Write {
         /// The file.
@@ -62,7 +64,7 @@ pub enum Error {
     },
     /// Not text, or the quotes do not close.
     #[error(
-        "{}, line {line}: not CSV text ({what}); save it as comma-separated UTF-8 text with one header line", file.display()
+        "{}, line {line}: not CSV text ({what})", file.display()
     )]
     NotCsv {
         /// The file.
@@ -73,7 +75,7 @@ pub enum Error {
         what: String,
     },
     /// Another encoding than UTF-8, or no text.
-    #[error("{} is {what}, not UTF-8 text; {next}", file.display())]
+    #[error("{} is {what}, not UTF-8 text", file.display())]
     Encoding {
         /// The file.
         file: PathBuf,
@@ -84,7 +86,7 @@ pub enum Error {
     },
     /// Numbers where the header should be.
     #[error(
-        "{}, line {line}: {fields} fields, numbers: the header is missing; put a line with the columns' names above", file.display()
+        "{}, line {line}: {fields} fields, numbers: the header is missing", file.display()
     )]
     NoHeader {
         /// The file.
@@ -96,7 +98,7 @@ pub enum Error {
     },
     /// Commas between the fields and within the numbers.
     #[error(
-        "{at}: {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields; save it with semicolons between the fields, or with decimal points"
+        "{at}: {found} fields, the header has {expected}: decimal commas cannot be told from the commas between fields"
     )]
     BothCommas {
         /// Where.
@@ -107,11 +109,11 @@ pub enum Error {
         expected: usize,
     },
     /// A decimal point in a file with decimal commas.
-    #[error("{0}: `{value}` has a point, others have decimal commas; save the file with one of them, without marks between thousands", value = .0.value)]
+    #[error("{0}: `{value}` has a point, others have decimal commas", value = .0.value)]
     TwoMarks(Field),
     /// No header line.
     #[error(
-        "{} is empty; it needs a header line that names the columns, then one line a sample", file.display()
+        "{} is empty", file.display()
     )]
     Empty {
         /// The file.
@@ -119,7 +121,7 @@ pub enum Error {
     },
     /// A column that is needed is not in the header.
     #[error(
-        "{}: column `{column}` is missing ({}); add it to the header line and to every row", file.display(), Named(found)
+        "{}: column `{column}` is missing ({})", file.display(), Named(found)
     )]
     MissingColumn {
         /// The file.
@@ -131,7 +133,7 @@ pub enum Error {
     },
     /// A column is in the header twice.
     #[error(
-        "{}: column `{column}` is in the header twice; remove or rename one of them", file.display()
+        "{}: column `{column}` is in the header twice", file.display()
     )]
     DuplicateColumn {
         /// The file.
@@ -140,7 +142,7 @@ pub enum Error {
         column: String,
     },
     /// A row has more or fewer fields than the header.
-    #[error("{at}: {found} fields, the header has {expected}; complete or remove this row")]
+    #[error("{at}: {found} fields, the header has {expected}")]
     Ragged {
         /// Where.
         at: Row,
@@ -150,15 +152,15 @@ pub enum Error {
         expected: usize,
     },
     /// A field is not a number.
-    #[error("{0}: `{value}` is not a number; write it like 0.25, or remove this row", value = .0.value)]
+    #[error("{0}: `{value}` is not a number", value = .0.value)]
     NotNumeric(Field),
     /// A field is NaN, infinite, or too large for a 32-bit number.
-    #[error("{0}: {value} is not a finite value; remove this row or fill the gap", value = .0.value)]
+    #[error("{0}: {value} is not a finite value", value = .0.value)]
     NotFinite(Field),
     /// An angle beyond a full turn.
     #[error(
         "{at}: {} is beyond {}", at.value,
-        if *degrees { "±360°; repair or remove this row" } else { "±2π radians; take full turns away where a sensor counted on, or say in the header that angles are in degrees (`index_mcp_flex [deg]`)" }
+        if *degrees { "±360°" } else { "±2π radians" }
     )]
     BeyondTurn {
         /// Where, and the value.
@@ -168,7 +170,7 @@ pub enum Error {
     },
     /// A unit that no angle has.
     #[error(
-        "{}: column `{column}` is in `{unit}`, which is no unit of angles; give radians ([rad]) or degrees ([deg])", file.display()
+        "{}: column `{column}` is in `{unit}`, which is no unit of angles", file.display()
     )]
     Unit {
         /// The file.
@@ -180,7 +182,7 @@ pub enum Error {
     },
     /// Angles of two units.
     #[error(
-        "{}: column `{column}` is not said to be in {others}, as others are; write one unit for all angles", file.display()
+        "{}: column `{column}` is not said to be in {others}, as others are", file.display()
     )]
     MixedUnits {
         /// The file.
@@ -192,7 +194,7 @@ pub enum Error {
     },
     /// Times do not grow.
     #[error(
-        "{at}: {} does not come after {before}; a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order", at.value
+        "{at}: {} does not come after {before}", at.value
     )]
     TimeNotIncreasing {
         /// Where, and the time of this row.
@@ -202,7 +204,7 @@ pub enum Error {
     },
     /// Fewer rows than the work at hand needs.
     #[error(
-        "{}: {found} rows, at least {needed} are needed; record more samples", file.display()
+        "{}: {found} rows, at least {needed} are needed", file.display()
     )]
     TooFewRows {
         /// The file.
@@ -212,6 +214,32 @@ pub enum Error {
         /// Rows needed.
         needed: usize,
     },
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::Read { .. } => "check the path and that you may read it".to_owned(),
+            Self::Write { .. } => "check that the folder exists and that you may write there".to_owned(),
+            Self::NotCsv { .. } => "save it as comma-separated UTF-8 text with one header line".to_owned(),
+            Self::Encoding { next, .. } => next.clone(),
+            Self::NoHeader { .. } => "put a line with the columns' names above".to_owned(),
+            Self::BothCommas { .. } => "save it with semicolons between the fields, or with decimal points".to_owned(),
+            Self::TwoMarks { .. } => "save the file with one of them, without marks between thousands".to_owned(),
+            Self::Empty { .. } => "it needs a header line that names the columns, then one line a sample".to_owned(),
+            Self::MissingColumn { .. } => "add it to the header line and to every row".to_owned(),
+            Self::DuplicateColumn { .. } => "remove or rename one of them".to_owned(),
+            Self::Ragged { .. } => "complete or remove this row".to_owned(),
+            Self::NotNumeric { .. } => "write it like 0.25, or remove this row".to_owned(),
+            Self::NotFinite { .. } => "remove this row or fill the gap".to_owned(),
+            Self::BeyondTurn { degrees: true, .. } => "repair or remove this row".to_owned(),
+            Self::BeyondTurn { .. } => "take full turns away where a sensor counted on, or say in the header that angles are in degrees (`index_mcp_flex [deg]`)".to_owned(),
+            Self::Unit { .. } => "give radians ([rad]) or degrees ([deg])".to_owned(),
+            Self::MixedUnits { .. } => "write one unit for all angles".to_owned(),
+            Self::TimeNotIncreasing { .. } => "a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order".to_owned(),
+            Self::TooFewRows { .. } => "record more samples".to_owned(),
+        }
+    }
 }
 
 /// A header as a person reads it in an error: the first names and how many more.

@@ -1,6 +1,7 @@
 //! Tables as people have them: each taken as what it is and said, or refused with what it is.
 
 use super::*;
+use crate::remedy::Remedy;
 use std::path::Path;
 
 const JOINTS: [&str; 4] = [
@@ -18,7 +19,7 @@ fn read(bytes: &[u8]) -> Result<(Poses, String), Error> {
 }
 
 fn fault(text: &str) -> String {
-    read(text.as_bytes()).unwrap_err().to_string()
+    read(text.as_bytes()).unwrap_err().told()
 }
 
 /// Motion of `count` frames that differ; `time` and `angle` write the numbers.
@@ -186,9 +187,7 @@ fn another_encoding_is_refused_by_its_name_with_the_way_out() {
         (&[], true),
         (&[], false),
     ] {
-        let said = read(&[mark, &wide(little)].concat())
-            .unwrap_err()
-            .to_string();
+        let said = read(&[mark, &wide(little)].concat()).unwrap_err().told();
         assert!(
             said.contains("UTF-16") && said.contains("UTF-8") && said.contains("iconv -f UTF-16"),
             "{said}"
@@ -198,7 +197,7 @@ fn another_encoding_is_refused_by_its_name_with_the_way_out() {
         (&b"PK\x03\x04"[..], "spreadsheet"),
         (b"\x1f\x8b\x08", "gunzip"),
     ] {
-        let said = read(start).unwrap_err().to_string();
+        let said = read(start).unwrap_err().told();
         assert!(said.contains(name), "{said}");
     }
 }
@@ -342,5 +341,5 @@ fn a_table_without_a_header_and_one_without_end_are_told() {
         Path::new("x"),
         Columns::Named(&JOINTS),
     );
-    assert!(said.unwrap_err().to_string().contains("longer than"));
+    assert!(said.unwrap_err().told().contains("longer than"));
 }

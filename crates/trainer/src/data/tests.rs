@@ -1,6 +1,7 @@
 //! The CSV files: what they carry, and that every fault is named with file, place, value and next step.
 
 use super::*;
+use crate::remedy::Remedy;
 use std::path::Path;
 
 const JOINTS: [&str; 2] = ["index_mcp_flex", "index_pip_flex"];
@@ -10,7 +11,7 @@ fn poses(text: &str) -> Result<Poses, Error> {
 }
 
 fn fault(text: &str) -> String {
-    poses(text).unwrap_err().to_string()
+    poses(text).unwrap_err().told()
 }
 
 #[test]
@@ -161,10 +162,10 @@ fn numbered_columns_end_at_the_highest_number_and_a_gap_is_named() {
     assert_eq!(truth.inputs, Matrix::from_rows(&[[1.0, 2.0]]));
     assert_eq!(truth.targets, Matrix::from_rows(&[[7.0]]));
     std::fs::write(&path, "q0,q2\n1,2\n").unwrap();
-    let said = read_samples(&path, "q").unwrap_err().to_string();
+    let said = read_samples(&path, "q").unwrap_err().told();
     assert!(said.contains("column `q1` is missing"), "{said}");
     std::fs::write(&path, "q18446744073709551615,a\n1,2\n").unwrap();
-    let said = read_samples(&path, "q").unwrap_err().to_string();
+    let said = read_samples(&path, "q").unwrap_err().told();
     assert!(said.contains("column `q0` is missing"), "{said}");
 }
 

@@ -2,11 +2,13 @@
 
 use std::path::PathBuf;
 
+use crate::remedy::Remedy;
+
 /// What can be wrong with a model file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
     /// The file cannot be opened or read.
-    #[error("cannot read {}: {source}; check the path and that you may read it", file.display())]
+    #[error("cannot read {}: {source}", file.display())]
     Read {
         /// The file.
         file: PathBuf,
@@ -14,7 +16,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The file cannot be written.
-    #[error("cannot write {}: {source}; check that the folder exists and that you may write there", file.display())]
+    #[error("cannot write {}: {source}", file.display())]
     Write {
         /// The file.
         file: PathBuf,
@@ -22,7 +24,7 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The bytes are no safetensors file.
-    #[error("{} is not a safetensors file ({what}); give a model that `gauntlet train --out` wrote", file.display())]
+    #[error("{} is not a safetensors file ({what})", file.display())]
     NotSafetensors {
         /// The file.
         file: PathBuf,
@@ -30,7 +32,7 @@ pub enum Error {
         what: String,
     },
     /// A tensor is not there.
-    #[error("{}: tensor `{tensor}` is missing; give a model that `gauntlet train --out` wrote", file.display())]
+    #[error("{}: tensor `{tensor}` is missing", file.display())]
     MissingTensor {
         /// The file.
         file: PathBuf,
@@ -38,7 +40,7 @@ pub enum Error {
         tensor: String,
     },
     /// A tensor has another shape than the rest asks for.
-    #[error("{}: tensor `{tensor}` has shape {found:?}, expected {expected}; the file is damaged or of another program: train again", file.display())]
+    #[error("{}: tensor `{tensor}` has shape {found:?}, expected {expected}", file.display())]
     TensorShape {
         /// The file.
         file: PathBuf,
@@ -50,7 +52,7 @@ pub enum Error {
         expected: String,
     },
     /// A tensor's numbers are not F32.
-    #[error("{}: tensor `{tensor}` holds {found} numbers, expected F32; convert it or train again", file.display())]
+    #[error("{}: tensor `{tensor}` holds {found} numbers, expected F32", file.display())]
     NotF32 {
         /// The file.
         file: PathBuf,
@@ -60,7 +62,7 @@ pub enum Error {
         found: String,
     },
     /// A number is NaN or infinite, or a scale is 0.
-    #[error("{}: tensor `{tensor}`, element {element} is {value}, which no model can use; train again", file.display())]
+    #[error("{}: tensor `{tensor}`, element {element} is {value}, which no model can use", file.display())]
     BadValue {
         /// The file.
         file: PathBuf,
@@ -72,7 +74,7 @@ pub enum Error {
         value: f32,
     },
     /// The numbers, or what is said about them, are not those that were written.
-    #[error("{}: {what} is not as it was written (its digest is another): the file is damaged; take a copy that is whole, or train again", file.display())]
+    #[error("{}: {what} is not as it was written (its digest is another): the file is damaged", file.display())]
     Damaged {
         /// The file.
         file: PathBuf,
@@ -80,7 +82,7 @@ pub enum Error {
         what: &'static str,
     },
     /// A sound model, but for other domains.
-    #[error("{}: this model maps {} values to {}, here {} to {} are needed; train one on data of this shape", file.display(), found[0], found[1], expected[0], expected[1])]
+    #[error("{}: this model maps {} values to {}, here {} to {} are needed", file.display(), found[0], found[1], expected[0], expected[1])]
     ModelShape {
         /// The file.
         file: PathBuf,
@@ -89,4 +91,26 @@ pub enum Error {
         /// Inputs and outputs needed.
         expected: [usize; 2],
     },
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        match self {
+            Self::Read { .. } => "check the path and that you may read it".to_owned(),
+            Self::Write { .. } => {
+                "check that the folder exists and that you may write there".to_owned()
+            }
+            Self::NotSafetensors { .. } => {
+                "give a model that gauntlet train --out wrote".to_owned()
+            }
+            Self::MissingTensor { .. } => "give a model that gauntlet train --out wrote".to_owned(),
+            Self::TensorShape { .. } => {
+                "the file is damaged or of another program: train again".to_owned()
+            }
+            Self::NotF32 { .. } => "convert it or train again".to_owned(),
+            Self::BadValue { .. } => "train again".to_owned(),
+            Self::Damaged { .. } => "take a copy that is whole, or train again".to_owned(),
+            Self::ModelShape { .. } => "train one on data of this shape".to_owned(),
+        }
+    }
 }

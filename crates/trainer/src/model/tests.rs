@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::random::Random;
+use crate::remedy::Remedy;
 use std::path::Path;
 
 fn model(inputs: usize, hidden: usize, outputs: usize) -> Model {
@@ -32,7 +33,7 @@ fn model(inputs: usize, hidden: usize, outputs: usize) -> Model {
 fn fault(bytes: &[u8]) -> String {
     Model::from_bytes(bytes, Path::new("m.safetensors"))
         .unwrap_err()
-        .to_string()
+        .told()
 }
 
 #[test]

@@ -3,10 +3,12 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use gripper::registers::three_finger;
+
+use crate::options::{model_parser, run_time};
 use host::lines::{Line, Model, Settings};
+use host::next::{Command, NextStep};
 
 /// Options of `gripper`.
 #[derive(Debug, Args)]
@@ -45,16 +47,30 @@ pub enum Verb {
     Watch(Watch),
 }
 
-/// Takes a gripper's name on the command line.
-pub fn model_parser() -> impl TypedValueParser<Value = Model> {
-    let names = Model::ALL.map(|model| {
-        let help = match model {
-            Model::ThreeFinger => "3-Finger Adaptive Gripper",
-            Model::TwoFinger85 | Model::TwoFinger140 | Model::HandE => model.name(),
-        };
-        PossibleValue::new(model.option()).help(help)
-    });
-    PossibleValuesParser::new(names).try_map(|name: String| name.parse::<Model>())
+impl Verb {
+    /// Where the gripper is and how to talk about it.
+    pub fn target(&self) -> &Target {
+        match self {
+            Self::Status(target) | Self::Activate(target) | Self::Reset(target) => target,
+            Self::Move(options) => &options.target,
+            Self::Mode(options) => &options.target,
+            Self::Release(options) => &options.target,
+            Self::Watch(options) => &options.target,
+        }
+    }
+
+    /// As it is typed.
+    pub fn name(&self) -> &'static str {
+        match self {
+            Self::Status(_) => "gripper status",
+            Self::Activate(_) => "gripper activate",
+            Self::Move(_) => "gripper move",
+            Self::Mode(_) => "gripper mode",
+            Self::Release(_) => "gripper release",
+            Self::Reset(_) => "gripper reset",
+            Self::Watch(_) => "gripper watch",
+        }
+    }
 }
 
 /// Where the gripper is and how to talk about it.
@@ -121,61 +137,52 @@ impl Target {
         }
     }
 
-    /// `gauntlet gripper VERB` for the same gripper, to be pasted.
-    pub fn again(&self, verb: &str) -> String {
-        self.command(verb, self.patience)
+    /// `gauntlet gripper VERB` for the same gripper.
+    pub fn again(&self, verb: &str) -> Command {
+        self.command(verb, self.settings())
     }
 
     /// The same with more patience than now.
-    pub fn patient(&self, verb: &str) -> String {
+    pub fn patient(&self, verb: &str) -> Command {
         self.patient_for(verb, Duration::ZERO)
     }
 
     /// The same with patience for answers as late as `late`, and some to spare.
-    pub fn patient_for(&self, verb: &str, late: Duration) -> String {
+    pub fn patient_for(&self, verb: &str, late: Duration) -> Command {
         let now = self.settings().patience();
         // In steps of 100 ms.
         let enough = Duration::from_millis(100 * (late.as_millis() as u64 / 100 + 1));
         let more = (now + Duration::from_millis(100)).max(enough + Duration::from_millis(100));
-        self.command(verb, Some(more.min(host::lines::MOST_PATIENCE)))
+        let settings = Settings {
+            patience: Some(more.min(host::lines::MOST_PATIENCE)),
+            ..self.settings()
+        };
+        self.command(verb, settings)
     }
 
-    /// `gauntlet doctor` for the same gripper, to be pasted.
-    pub fn doctor(&self) -> String {
-        self.words("doctor", self.patience)
+    /// `gauntlet doctor` for the same gripper.
+    pub fn doctor(&self) -> Command {
+        let doctor = Command::gauntlet("doctor");
+        self.settings().named_in(doctor, &self.gripper, self.model)
     }
 
-    fn command(&self, verb: &str, patience: Option<Duration>) -> String {
-        self.words(&format!("gripper {verb}"), patience)
+    /// What to do about a fault, with the commands for it.
+    pub fn cure(&self, fault: gripper::Fault) -> NextStep {
+        host::diagnose::cure(fault, |verb| {
+            self.named_in(Command::gauntlet(verb), self.settings())
+        })
     }
 
-    fn words(&self, verb: &str, patience: Option<Duration>) -> String {
-        let mut text = format!("`gauntlet {verb} --gripper {}", quoted(&self.gripper));
-        if self.model != Model::ThreeFinger {
-            text.push_str(&format!(" --gripper-model {}", self.model.option()));
-        }
-        if let Some(unit) = self.unit {
-            text.push_str(&format!(" --unit {unit}"));
-        }
-        if let Some(baud) = self.baud {
-            text.push_str(&format!(" --baud {baud}"));
-        }
-        if let Some(patience) = patience {
-            text.push_str(&format!(" --patience {}", patience.as_millis()));
-        }
-        text.push('`');
-        text
+    fn command(&self, verb: &str, settings: Settings) -> Command {
+        self.named_in(Command::gauntlet(&format!("gripper {verb}")), settings)
     }
-}
 
-/// A path as a shell takes it.
-fn quoted(path: &Path) -> String {
-    let text = path.display().to_string();
-    let plain = |c: char| c.is_alphanumeric() || "/._-:[]@+".contains(c);
-    if text.chars().all(plain) {
-        text
-    } else {
-        format!("'{}'", text.replace('\'', "'\\''"))
+    fn named_in(&self, command: Command, settings: Settings) -> Command {
+        let command = settings.named_in(command, &self.gripper, self.model);
+        match self.trust_model {
+            true => command.word("--trust-model"),
+            false => command,
+        }
     }
 }
 
@@ -204,13 +211,13 @@ pub struct Move {
 }
 
 impl Move {
-    /// The same move again, to be pasted.
-    pub fn again(&self) -> String {
+    /// The same move again.
+    pub fn again(&self) -> Command {
         self.target.again(&self.verb())
     }
 
     /// The same with more patience than now.
-    pub fn patient(&self) -> String {
+    pub fn patient(&self) -> Command {
         self.target.patient(&self.verb())
     }
 
@@ -278,6 +285,6 @@ pub struct Watch {
     #[command(flatten)]
     pub target: Target,
     /// End by itself after this many seconds (1 to 86400).
-    #[arg(long, value_name = "N", default_value = "60", value_parser = crate::cli::run_time)]
+    #[arg(long, value_name = "N", default_value = "60", value_parser = run_time)]
     pub seconds: Duration,
 }

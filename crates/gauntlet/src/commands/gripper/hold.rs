@@ -5,9 +5,10 @@ use std::time::Duration;
 use gripper::travel::Verdict;
 use gripper::{Contact, Event, Gripper};
 
-use super::Doing;
 use super::bench::Bench;
-use super::leader::{Leader, STALL, since};
+use super::doing::Doing;
+use super::leader::{Leader, STALL};
+use host::clock::since;
 
 /// Until the hold is confirmed: positions may have to agree for a while first, and some fifty cycles.
 const HOLD_WAIT: Duration = Duration::from_millis(800);

@@ -6,13 +6,15 @@ use gripper::assurance::Assurance;
 use gripper::travel::{Plausibility, Verdict};
 use gripper::{Activation, Fault, Instant, Motion, Status, timing};
 
+use super::allowed::{can_hold, may_move};
+use super::args::Move;
 use super::axes::{Axes, next_command};
 use super::bench::Bench;
+use super::doing::Doing;
 use super::progress::{Judgement, Progress, Rest, STUCK};
 use super::proof::{Proof, Step};
-use super::refusal::{can_hold, may_move};
-use super::{Doing, Move, table};
-use host::clock::ticks;
+use super::table;
+use host::clock::{since, ticks};
 use host::failure::Failure;
 
 /// Most counts a command may be from where an axis truly is.
@@ -352,12 +354,6 @@ impl<'a, const X: usize> Leader<'a, X> {
             }
         }
     }
-}
-
-/// Time from `then` to `now`; nothing where `then` is later.
-pub(super) fn since(now: Instant, then: Instant) -> gripper::Duration {
-    now.checked_duration_since(then)
-        .unwrap_or(gripper::Duration::from_ticks(0))
 }
 
 #[cfg(test)]

@@ -147,6 +147,7 @@ fn moved<F: FnMut(u64, u8) -> u8>(
     let first = driver.poll(Instant::from_ticks(CYCLE));
     let first = first.and_then(Event::ended).unwrap().unwrap();
     let doing = Doing {
+        verb: "gripper move",
         driver: Scripted::new(30.0, |_, truth| truth),
         target: &options.target,
         waiter: Waiter {
@@ -262,11 +263,8 @@ fn a_next_step_is_the_whole_command() {
         speed: 1,
         force: 2,
     };
-    let whole = "`gauntlet gripper move --to 9 --speed 1 --force 2 --gripper /dev/gripper --gripper-model 2f85";
-    assert_eq!(options.again(), format!("{whole}`"));
-    assert!(
-        options
-            .patient()
-            .starts_with(&format!("{whole} --patience"))
-    );
+    let whole = "gauntlet gripper move --to 9 --speed 1 --force 2 --gripper /dev/gripper --gripper-model 2f85";
+    assert_eq!(options.again().to_string(), whole);
+    let patient = options.patient().to_string();
+    assert!(patient.starts_with(&format!("{whole} --patience")));
 }

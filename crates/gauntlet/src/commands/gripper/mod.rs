@@ -1,8 +1,10 @@
 //! `gauntlet gripper`: a gripper at a bench. Nothing moves but by the verb that says so.
 
+mod allowed;
 mod args;
 mod axes;
 mod bench;
+mod doing;
 mod hold;
 mod leader;
 mod motion;
@@ -10,14 +12,12 @@ mod progress;
 mod proof;
 mod refusal;
 mod show;
+mod silent;
 mod table;
 mod task;
 
-use std::time::Duration;
-
 use anyhow::Result;
 use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::registers::{Kind, Severity};
 use gripper::{Activation, Fault, Status};
 
 use crate::tell::Tell;
@@ -25,27 +25,16 @@ use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::lines::Line;
 
-pub use args::{Grasp, Gripper, Mode, Move, Release, Target, Verb, Watch, model_parser};
-pub(super) use bench::{Bench, Waiter};
+pub use args::{Grasp, Gripper, Mode, Move, Release, Target, Verb, Watch};
+use bench::{Bench, Waiter};
+use doing::{Doing, is_refusing};
 pub use host::lines::Model;
-
-impl Verb {
-    fn target(&self) -> &Target {
-        match self {
-            Self::Status(target) | Self::Activate(target) | Self::Reset(target) => target,
-            Self::Move(options) => &options.target,
-            Self::Mode(options) => &options.target,
-            Self::Release(options) => &options.target,
-            Self::Watch(options) => &options.target,
-        }
-    }
-}
 
 /// Runs one verb; every one ends within a deadline.
 ///
 /// # Errors
 /// A failure that says why it did not happen and what to do.
-pub(super) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
     let target = options.verb.target();
     let is_tcp = host::lines::tcp::Address::parse(&target.gripper)?.is_some();
     if is_tcp && target.model != Model::ThreeFinger {
@@ -77,16 +66,8 @@ fn first_status<B: Bench<X>, const X: usize>(
         if waiter.interrupt.asked() {
             return Failure::interrupted("before the gripper answered").into();
         }
-        no_answer(target, driver, config, last)
+        silent::no_answer(target, driver, config, last)
     })
-}
-
-/// A verb under way.
-struct Doing<'a, B> {
-    driver: B,
-    target: &'a Target,
-    waiter: Waiter,
-    tell: Tell,
 }
 
 fn act<B: Bench<X>, const X: usize>(
@@ -102,6 +83,7 @@ fn act<B: Bench<X>, const X: usize>(
     let mut doing = Doing {
         driver,
         target,
+        verb: options.verb.name(),
         waiter,
         tell,
     };
@@ -139,164 +121,5 @@ fn act<B: Bench<X>, const X: usize>(
             })))
         }
         Verb::Watch(options) => doing.watch(options.seconds),
-    }
-}
-
-/// Whether it says that it takes no motion, whatever it says of its activation.
-fn is_refusing<const X: usize>(status: &Status<X>) -> bool {
-    matches!(
-        status.fault.severity(),
-        Severity::Priority | Severity::Major
-    )
-}
-
-fn no_answer<B: Bench<X>, const X: usize>(
-    target: &Target,
-    driver: &mut B,
-    config: gripper::driver::Config,
-    last: Option<gripper::Error>,
-) -> anyhow::Error {
-    let place = target.gripper.display();
-    let (name, _) = driver.names();
-    if let Some(gripper::Error::OtherGripper(kind)) = last {
-        return Failure::new(
-            format!(
-                "a {} answers on {place}, not a {name}: nothing was written to it",
-                kind.name()
-            ),
-            match kind {
-                Kind::ThreeFinger => "--gripper-model 3f (--model 3f is the same)",
-                Kind::TwoFinger => {
-                    "--gripper-model 2f85, 2f140 or hande (--model 2f85 is the same): which of them it is no register says"
-                }
-            },
-        )
-        .into();
-    }
-    if let Some(error) = driver.line_error() {
-        let what = format!(
-            "no {name} answers at {place} as unit {}: {error}",
-            config.unit
-        );
-        let next = match error {
-            host::lines::tcp::Error::Timeout => format!(
-                "{}; ending other programs that are connected to it; another --unit (2 by default); the gripper's power",
-                target.patient_for("status", host::lines::MOST_PATIENCE)
-            ),
-            error => error.next_step().to_owned(),
-        };
-        return Failure::new(what, next).into();
-    }
-    if let Some(late) = driver.lateness() {
-        let late = late.as_ticks().div_ceil(1_000);
-        return Failure::new(
-            format!(
-                "a gripper answers on {place} as unit {}, but late: up to {late} ms after it was asked",
-                config.unit
-            ),
-            format!(
-                "{}, which waits longer; the adapter's latency timer (`gauntlet ports`), or the tunnel that keeps its bytes back",
-                target.patient_for("status", Duration::from_millis(late))
-            ),
-        )
-        .into();
-    }
-    if let Some(gripper::Error::Link(error @ gripper::link::Error::Shifted(_))) = last {
-        return Failure::new(
-            format!(
-                "no {name} answers on {place} as unit {}: {error}",
-                config.unit
-            ),
-            format!(
-                "an adapter with bias resistors and 120 ohms at both ends of the bus, then {}",
-                target.again("status")
-            ),
-        )
-        .into();
-    }
-    let why = last.map_or_else(String::new, |error| format!(": {error}"));
-    let refused = matches!(
-        last,
-        Some(gripper::Error::Link(gripper::link::Error::Exception(_)))
-    );
-    if refused && target.model == Model::ThreeFinger {
-        return Failure::new(
-            format!(
-                "no {name} answers on {place} as unit {}{why}; a {name} sends no exceptions",
-                config.unit
-            ),
-            "--gripper-model 2f85, 2f140 or hande, if it is one of them",
-        )
-        .into();
-    }
-    Failure::new(
-        format!(
-            "no {name} answers on {place} as unit {} at {} baud{why}",
-            config.unit, config.baud
-        ),
-        format!("{}, which finds out which layer fails", target.doctor()),
-    )
-    .into()
-}
-
-impl<B> Doing<'_, B> {
-    /// Waits until the task just asked for has ended.
-    fn finish<const X: usize>(&mut self) -> Result<()>
-    where
-        B: Bench<X>,
-    {
-        task::finish(&self.waiter, &mut self.driver, self.target)
-    }
-
-    fn place(&self) -> String {
-        self.target.gripper.display().to_string()
-    }
-
-    fn activate<const X: usize>(&mut self, status: &Status<X>) -> Result<()>
-    where
-        B: Bench<X>,
-    {
-        let healthy = status.fault.severity() != Severity::Major;
-        if status.activation == Activation::Ready && healthy {
-            self.tell
-                .say(format_args!("it is activated already: nothing moves"));
-            return Ok(());
-        }
-        self.tell
-            .say(format_args!("activating: the fingers move, keep clear"));
-        self.driver.activate();
-        self.finish()
-    }
-
-    fn mode<const X: usize>(&mut self, mode: Grasp) -> Result<()>
-    where
-        B: Bench<X>,
-    {
-        if !self.driver.set_mode(mode.into()) {
-            let (name, _) = self.driver.names();
-            let what = format!("a {name} has no grasping modes");
-            let next = self.target.again("move --to 120");
-            return Err(Failure::usage(what, next).into());
-        }
-        self.tell
-            .say(format_args!("changing the mode: the fingers move"));
-        self.finish()
-    }
-
-    fn release<const X: usize>(&mut self, closing: bool) -> Result<()>
-    where
-        B: Bench<X>,
-    {
-        if !self.driver.release(closing) {
-            return Err(Failure::usage(
-                "a 3-Finger gripper can only open in an automatic release",
-                "the same without --closing",
-            )
-            .into());
-        }
-        self.tell.say(format_args!(
-            "automatic release: the fingers move slowly; it ends in fault 0F, as it should"
-        ));
-        self.finish()
     }
 }

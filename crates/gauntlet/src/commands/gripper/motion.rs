@@ -10,15 +10,17 @@ use std::time::Duration;
 use anyhow::Result;
 use gripper::{Activation, Fault, Status, space};
 
+use super::allowed::may_move;
+use super::args::Move;
 use super::args::Target;
 use super::axes::Axes;
 use super::bench::Bench;
+use super::doing::Doing;
 use super::leader::{End, LEAD, Leader, SILENCE};
-use super::refusal::may_move;
-use super::{Doing, Move};
 use crate::note;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Suspend;
+use host::next::{NextStep, advice};
 
 /// The slowest full stroke takes 7 s; one that needs longer is stuck.
 const MOVE_WAIT: Duration = Duration::from_secs(15);
@@ -63,14 +65,14 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
         }
         Some(End::Refused { failure, hold }) if !hold || !written => failure,
         Some(End::Refused { failure, .. }) => {
-            let next = failure.next_step().to_owned();
+            let next = failure.next().clone();
             held(doing, &mut leader, &failure.to_string(), next)
         }
         Some(End::Doubted(failure)) => not_held(&failure, written),
         Some(End::Stood(time)) => {
             let seconds = time.as_ticks() as f64 / 1e6;
             let why = format!("the process stood still for {seconds:.1} s during the move");
-            held(doing, &mut leader, &why, options.again())
+            held(doing, &mut leader, &why, options.again().into())
         }
         Some(End::Suspended) => suspended(doing, &mut leader, &suspend),
         Some(End::Silent) => unsure(
@@ -89,7 +91,7 @@ fn suspended<B: Bench<X>, const X: usize>(
     suspend: &Suspend,
 ) -> Failure {
     let why = "the process was stopped (Ctrl-Z) during the move";
-    let failure = held(doing, leader, why, leader.options.again());
+    let failure = held(doing, leader, why, leader.options.again().into());
     note!("{failure}");
     // Where it does not stop it ends all the same.
     let _ = suspend.stop();
@@ -101,7 +103,7 @@ fn held<B: Bench<X>, const X: usize>(
     doing: &mut Doing<'_, B>,
     leader: &mut Leader<X>,
     why: &str,
-    next: String,
+    next: NextStep,
 ) -> Failure {
     if leader.hold(doing) {
         Failure::new(format!("{why}; the gripper is held where it is"), next)
@@ -121,7 +123,7 @@ fn not_held(failure: &Failure, written: bool) -> Failure {
     } else {
         format!("{failure}. Nothing was written")
     };
-    Failure::new(what, failure.next_step())
+    Failure::new(what, failure.next())
 }
 
 /// A 2-Finger gripper that nobody spoke to for a second says so (fault 09) until it has been asked again.
@@ -180,18 +182,18 @@ fn given_up<B: Bench<X>, const X: usize>(
     }
     let seconds = move_wait(doing.target).as_secs();
     let why = format!("the gripper was not there {seconds} s after it was told to move");
-    held(doing, leader, &why, doing.target.doctor())
+    held(doing, leader, &why, doing.target.doctor().into())
 }
 
 /// Nobody can say what the gripper does; how far it may go is known.
 fn unsure(what: &str, target: &Target) -> Failure {
     Failure::new(
         what,
-        format!(
+        advice(format!(
             "look at the gripper: an axis comes to rest at most {LEAD} counts from where it was; in danger switch off its \
-             24 V supply; then {}",
-            target.doctor()
-        ),
+             24 V supply; then "
+        ))
+        .then(target.doctor()),
     )
 }
 

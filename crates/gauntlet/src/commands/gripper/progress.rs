@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 
 use gripper::{Contact, Duration, Instant, Status};
 
-use super::leader::since;
+use host::clock::since;
 
 /// An axis within so many counts of its target is there: positions are rounded, and motors stop a count early or late.
 pub(super) const NEAR: u8 = 2;

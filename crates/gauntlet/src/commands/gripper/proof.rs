@@ -4,8 +4,8 @@
 
 use gripper::{Duration, Instant, Status};
 
-use super::leader::since;
 use super::progress::{NEAR, Rest, STANDS, STUCK, is_at_stop};
+use host::clock::since;
 
 /// The step back, counts. With the lead of a finger on its way it stays within [`super::leader::LEAD`] of where a finger
 /// whose position has frozen can be.

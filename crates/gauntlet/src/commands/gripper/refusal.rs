@@ -1,11 +1,11 @@
 //! Why a move does not go on, in words, with the next step.
 
-use gripper::registers::Severity;
-use gripper::{Activation, Fault, Instant, Status};
+use gripper::{Instant, Status};
 
-use super::args::Target;
-use super::leader::{Leader, since};
+use super::leader::Leader;
+use host::clock::since;
 use host::failure::Failure;
+use host::next::advice;
 
 impl<const X: usize> Leader<'_, X> {
     pub(super) fn implausible(&self, status: &Status<X>, axis: usize) -> Failure {
@@ -46,10 +46,9 @@ impl<const X: usize> Leader<'_, X> {
     fn doubt(&self, what: String) -> Failure {
         Failure::new(
             what,
-            format!(
-                "looking at the gripper, then {}: a worn position sensor, or two devices that answer as one unit",
-                self.options.target.again("watch --raw")
-            ),
+            advice("looking at the gripper, then ")
+                .then(self.options.target.again("watch --raw"))
+                .then(": a worn position sensor, or two devices that answer as one unit"),
         )
     }
 
@@ -59,10 +58,8 @@ impl<const X: usize> Leader<'_, X> {
             format!(
                 "{name} stands at {here} although told to move to {there}, and touches nothing as far as the gripper says"
             ),
-            format!(
-                "looking at what keeps it from moving and at its 24 V supply, then {}",
-                self.options.target.again("status")
-            ),
+            advice("looking at what keeps it from moving and at its 24 V supply, then ")
+                .then(self.options.target.again("status")),
         )
     }
 
@@ -83,10 +80,8 @@ impl<const X: usize> Leader<'_, X> {
         };
         Failure::new(
             what,
-            format!(
-                "ending other programs and gateways that write to it, then {}",
-                self.options.target.again("status --raw")
-            ),
+            advice("ending other programs and gateways that write to it, then ")
+                .then(self.options.target.again("status --raw")),
         )
     }
 
@@ -100,57 +95,4 @@ impl<const X: usize> Leader<'_, X> {
             self.options.patient(),
         )
     }
-}
-
-/// Whether the gripper may be told to move.
-///
-/// # Errors
-/// Any fault it reports, as in `teleop`; or that it is not ready.
-pub(super) fn may_move<const X: usize>(status: &Status<X>, target: &Target) -> Result<(), Failure> {
-    if status.fault != Fault::None {
-        let next = match (status.fault, status.activation) {
-            // It is activated: only a new start clears that.
-            (Fault::ActivationNeeded | Fault::NotActivated, Activation::Ready) => format!(
-                "{}, then {}: the gripper lets go, then its fingers move",
-                target.again("reset"),
-                target.again("activate")
-            ),
-            (Fault::ActivationNeeded | Fault::NotActivated, _) => {
-                format!("{}: {}", target.again("activate"), status.fault.action())
-            }
-            _ => status.fault.action().to_owned(),
-        };
-        let (code, sentence) = (status.fault.code(), status.fault.sentence());
-        // The sentence ends the thought; what follows it here goes on.
-        let sentence = sentence.trim_end_matches('.');
-        let not_activated = match status.activation {
-            Activation::Reset => " (it is not activated)",
-            _ => "",
-        };
-        return Err(Failure::new(
-            format!("it does not move on: fault {code:02X}: {sentence}{not_activated}"),
-            next,
-        ));
-    }
-    match status.activation {
-        Activation::Ready => Ok(()),
-        Activation::Reset => Err(Failure::new(
-            "it cannot move: the gripper is not activated",
-            format!(
-                "{}: the fingers move through their whole range",
-                target.again("activate")
-            ),
-        )),
-        Activation::Activating | Activation::ChangingMode => Err(Failure::new(
-            "it cannot move: the gripper is busy activating or changing its mode",
-            "again in a few seconds",
-        )),
-    }
-}
-
-/// Whether a hold may be written: rACT in it would activate a gripper that is not.
-pub(super) fn can_hold<const X: usize>(status: &Status<X>) -> bool {
-    status.activation == Activation::Ready
-        && status.fault.severity() != Severity::Major
-        && status.fault != Fault::Releasing
 }

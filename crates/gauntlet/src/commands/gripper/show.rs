@@ -8,9 +8,12 @@ use gripper::travel::{DOUBTS, Plausibility, Verdict};
 use gripper::{Activation, Fault, Status};
 
 use super::bench::Bench;
-use super::{Doing, is_refusing, table};
-use crate::{out, say};
+use super::doing::{Doing, is_refusing};
+use super::table;
+use crate::results::{self, devices};
+use crate::say;
 use host::failure::Failure;
+use host::next::{NextStep, advice};
 use host::words;
 
 /// `watch` shows changes at most this often.
@@ -65,10 +68,9 @@ impl<B> Doing<'_, B> {
         if jumps {
             return Err(Failure::new(
                 "the positions cannot be true: they jump from status to status as nothing moves",
-                format!(
-                    "looking at the gripper, then {}: a worn position sensor, or two devices that answer as one unit",
-                    self.target.again("watch --raw")
-                ),
+                advice("looking at the gripper, then ")
+                    .then(self.target.again("watch --raw"))
+                    .then(": a worn position sensor, or two devices that answer as one unit"),
             )
             .into());
         }
@@ -146,16 +148,13 @@ impl<B> Doing<'_, B> {
                 "the gripper was said to be {what}, and its status does not bear that out: {state}{fault}"
             ),
             if is_refusing(status) && status.activation == Activation::Ready {
-                format!(
-                    "{}, then {}: the gripper lets go, then its fingers move",
-                    self.target.again("reset"),
-                    self.target.again("activate")
-                )
+                self.target
+                    .again("reset")
+                    .then(", then ")
+                    .then(self.target.again("activate"))
+                    .then(": the gripper lets go, then its fingers move")
             } else {
-                format!(
-                    "looking at the gripper, then {}",
-                    self.target.again("watch --raw")
-                )
+                advice("looking at the gripper, then ").then(self.target.again("watch --raw"))
             },
         )
     }
@@ -165,11 +164,10 @@ impl<B> Doing<'_, B> {
     where
         B: Bench<X>,
     {
-        let (place, raw) = (self.place(), self.target.raw);
         if self.target.json {
-            return out::json(&table::json(&self.driver, status, &place, raw));
+            return results::print(self.verb, table::state(&self.driver, status, self.target));
         }
-        for line in table::lines(&self.driver, status, &place, raw) {
+        for line in table::lines(&self.driver, status, self.target) {
             say!("{line}");
         }
         Ok(())
@@ -179,7 +177,8 @@ impl<B> Doing<'_, B> {
     where
         B: Bench<X>,
     {
-        let (place, raw, json) = (self.place(), self.target.raw, self.target.json);
+        let (target, verb) = (self.target, self.verb);
+        let (raw, json) = (target.raw, target.json);
         let patience = 4 * self.target.settings().patience();
         let started = Instant::now();
         if !json {
@@ -199,20 +198,17 @@ impl<B> Doing<'_, B> {
                 let text = match heard {
                     None => return ControlFlow::<()>::Continue(()),
                     Some(Ok(status)) if json => {
-                        table::json(driver, &status, &place, raw).to_string()
+                        results::line(verb, table::state(driver, &status, target))
                     }
                     Some(Ok(status)) => table::line(driver, &status, raw),
                     Some(Err(error)) => {
-                        let (what, next) = match driver.line_error() {
-                            Some(error) => (error.to_string(), Some(error.next_step())),
-                            None => (error.to_string(), None),
+                        let (error, next) = match driver.line_error() {
+                            Some(error) => (error.to_string(), error.next_step().into()),
+                            None => (error.to_string(), NextStep::default()),
                         };
-                        match (json, next) {
-                            (false, _) => what,
-                            (true, None) => serde_json::json!({ "error": what }).to_string(),
-                            (true, Some(next)) => {
-                                serde_json::json!({ "error": what, "try": next }).to_string()
-                            }
+                        match json {
+                            true => results::line(verb, devices::NoAnswer { error, next }),
+                            false => error,
                         }
                     }
                 };

@@ -1,9 +1,10 @@
 //! A status as a person reads it, and as JSON.
 
 use gripper::{Contact, Fault, Status};
-use serde_json::{Value, json};
 
+use super::args::Target;
 use super::bench::Bench;
+use crate::results::devices;
 use host::words;
 
 /// Software limits lie inside the mechanical stops, at most so many counts from either end.
@@ -36,10 +37,10 @@ fn asked<const X: usize>(status: &Status<X>, axis: usize) -> String {
 pub fn lines<B: Bench<X>, const X: usize>(
     driver: &B,
     status: &Status<X>,
-    place: &str,
-    raw: bool,
+    target: &Target,
 ) -> Vec<String> {
     let (name, axes) = driver.names();
+    let place = target.gripper.display();
     let mut lines = vec![
         format!("{name} on {place}"),
         format!("  activation  {}", words::activation(status.activation)),
@@ -52,7 +53,7 @@ pub fn lines<B: Bench<X>, const X: usize>(
         fault => {
             let (code, sentence) = (fault.code(), fault.sentence());
             lines.push(format!("  fault       {code:02X}: {sentence}"));
-            lines.push(format!("  try         {}", fault.action()));
+            lines.push(format!("  try         {}", target.cure(fault)));
         }
     }
     lines.push("  axis      position  asked  current".to_owned());
@@ -65,7 +66,9 @@ pub fn lines<B: Bench<X>, const X: usize>(
             axis_words(status, axis)
         ));
     }
-    if raw && let Some(bytes) = driver.raw() {
+    if target.raw
+        && let Some(bytes) = driver.raw()
+    {
         lines.push(format!("  raw         {}", hex(&bytes)));
     }
     lines
@@ -96,52 +99,40 @@ pub fn line<B: Bench<X>, const X: usize>(driver: &B, status: &Status<X>, raw: bo
 }
 
 /// The same as data.
-pub fn json<B: Bench<X>, const X: usize>(
+pub fn state<B: Bench<X>, const X: usize>(
     driver: &B,
     status: &Status<X>,
-    place: &str,
-    raw: bool,
-) -> Value {
-    let (name, names) = driver.names();
-    let axes: Vec<Value> = names
-        .iter()
-        .enumerate()
-        .map(|(axis, name)| {
-            json!({
-                "name": name,
-                "position": status.position[axis],
-                "asked": status.going_to.then_some(status.echo[axis]),
-                "current_ma": u32::from(status.current[axis]) * 10,
-                "state": axis_words(status, axis),
-            })
-        })
-        .collect();
-    let mut value = json!({
-        "gripper": place,
-        "model": name,
-        "activation": words::activation(status.activation),
-        "going_to": status.going_to,
-        "fault": fault(status.fault),
-        "axes": axes,
+    target: &Target,
+) -> devices::Gripper {
+    let (_, names) = driver.names();
+    let axes = names.iter().enumerate().map(|(axis, name)| devices::Axis {
+        name,
+        position: status.position[axis],
+        asked: status.going_to.then_some(status.echo[axis]),
+        current_ma: u32::from(status.current[axis]) * 10,
+        state: axis_words(status, axis),
     });
-    for (fact, text) in driver.facts() {
-        value[fact] = text.into();
-    }
-    if raw {
-        value["raw"] = driver.raw().map(|bytes| hex(&bytes)).into();
-    }
-    value
-}
-
-/// A fault as data; null for none.
-pub fn fault(fault: Fault) -> Value {
-    match fault {
-        Fault::None => Value::Null,
-        fault => json!({
-            "code": format!("{:02X}", fault.code()),
-            "meaning": fault.sentence(),
-            "try": fault.action(),
+    let facts = driver.facts();
+    let fact = |name: &str| {
+        let found = facts.iter().find(|(fact, _)| *fact == name);
+        found.map(|(_, text)| text.clone())
+    };
+    let raw = driver.raw().filter(|_| target.raw);
+    devices::Gripper {
+        place: target.gripper.display().to_string(),
+        gripper_model: target.model.option(),
+        activation: words::activation(status.activation),
+        going_to: status.going_to,
+        mode: fact("mode"),
+        motion: fact("motion"),
+        controller: fact("controller"),
+        fault: (status.fault != Fault::None).then(|| devices::Fault {
+            code: format!("{:02X}", status.fault.code()),
+            meaning: status.fault.sentence(),
+            next: target.cure(status.fault),
         }),
+        axes: axes.collect(),
+        raw: raw.map(|bytes| hex(&bytes)),
     }
 }
 

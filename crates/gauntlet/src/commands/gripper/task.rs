@@ -11,6 +11,7 @@ use super::args::Target;
 use super::bench::{Bench, Waiter};
 use host::clock::ticks;
 use host::failure::Failure;
+use host::next::{NextStep, advice};
 
 /// Longer than every task's own deadline, for a driver that is never polled to its end.
 const TASK_WAIT: Duration = Duration::from_secs(65);
@@ -116,7 +117,7 @@ fn silent<B: Bench<X>, const X: usize>(
                 "the gripper's answers came late{task}, by up to {} ms, and then none in time; whether it goes on is not known",
                 late.as_ticks() / 1_000
             ),
-            format!("looking at it, then {}", target.patient("status")),
+            advice("looking at it, then ").then(target.patient("status")),
         )
         .into();
     }
@@ -125,14 +126,12 @@ fn silent<B: Bench<X>, const X: usize>(
         None => String::new(),
     };
     let (what, next) = if driver.counters().writes == written {
-        ("; it was told nothing", target.doctor())
+        ("; it was told nothing", NextStep::from(target.doctor()))
     } else {
         (
             "; whether it goes on with what it has begun is not known",
-            format!(
-                "looking at it; in danger switch off its 24 V supply; then {}",
-                target.doctor()
-            ),
+            advice("looking at it; in danger switch off its 24 V supply; then ")
+                .then(target.doctor()),
         )
     };
     Failure::new(
@@ -150,11 +149,11 @@ fn failed(task: Task, why: Why, last: Option<gripper::Error>, target: &Target) -
                 fault.code(),
                 fault.sentence()
             ),
-            fault.action(),
+            target.cure(fault),
         ),
         Why::NotReady(Activation::Reset) => Failure::new(
             format!("no {task}: the gripper is not activated"),
-            format!("{}: the fingers move", target.again("activate")),
+            target.again("activate").then(": the fingers move"),
         ),
         Why::NotReady(_) => Failure::new(
             format!("no {task}: the gripper is busy activating or changing its mode"),
@@ -164,10 +163,8 @@ fn failed(task: Task, why: Why, last: Option<gripper::Error>, target: &Target) -
             format!(
                 "no {task}: the gripper answers but does not take what is written; its status reads back otherwise"
             ),
-            format!(
-                "ending other programs and gateways that write to it, then {}",
-                target.again("status --raw")
-            ),
+            advice("ending other programs and gateways that write to it, then ")
+                .then(target.again("status --raw")),
         ),
         Why::Deadline => {
             let last = match last {
@@ -176,7 +173,7 @@ fn failed(task: Task, why: Why, last: Option<gripper::Error>, target: &Target) -
             };
             Failure::new(
                 format!("the {task} did not end in time, though the gripper answers{last}"),
-                format!("clearing the fingers' way, then {}", target.doctor()),
+                advice("clearing the fingers' way, then ").then(target.doctor()),
             )
         }
     }

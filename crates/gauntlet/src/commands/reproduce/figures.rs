@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use anyhow::Result;
 use charts::{Chart, Drawing, Panel, charts, panels};
 use paper::figure::{fold_share, heat, over_epochs, over_pairs, shapes, snapshots};
+use paper::plan::{APPENDIX, What};
 use paper::printed::MEASURES;
 use paper::shapes::ShapePair;
 use paper::{Cell, Kept, Source};
-use serde_json::{Value, json};
 use trainer::data::{write_pairs, write_samples};
 
 use super::Bench;
 use super::tables::save;
-use super::what::{APPENDIX, What};
-use host::failure::told;
+use crate::results::paper::{Fold, Made, Numbers, Shape};
+use host::failure::{OrFail, told};
 
 const SP1: [Source; 1] = [Source::Shape(ShapePair::Sp1)];
 /// d̄, VO, d-Knn, NMSE.
@@ -28,7 +28,7 @@ const FLIPPED: core::ops::RangeInclusive<f64> = 0.05..=0.95;
 
 impl Bench<'_> {
     /// Draws a figure.
-    pub(super) fn figure(&self, what: What, done: &[(Cell, Kept)]) -> Result<Value> {
+    pub(super) fn figure(&self, what: What, done: &[(Cell, Kept)]) -> Result<Made> {
         let epochs = |sources: &[Source], measures: &[usize]| {
             self.curves(what, sources, measures, &|source| over_epochs(source, done))
         };
@@ -53,7 +53,7 @@ impl Bench<'_> {
             What::Fig9 => self.chosen_pairs(what, done),
             What::Fig12 => self.trajectory(what),
             What::Fig13 => self.principal_axes(what, done),
-            What::All | What::Table2 | What::Table4 => Ok(Value::Null),
+            What::All | What::Table2 | What::Table4 => Ok(self.wrote(what, &[], None)),
         }
     }
 
@@ -63,7 +63,7 @@ impl Bench<'_> {
         sources: &[Source],
         measures: &[usize],
         of: &dyn Fn(Source) -> Vec<Chart>,
-    ) -> Result<Value> {
+    ) -> Result<Made> {
         let is_wanted = |chart: &Chart| measures.iter().any(|&m| MEASURES[m] == chart.y_label);
         let drawn: Vec<Chart> = (sources.iter())
             .flat_map(|&source| of(source).into_iter().filter(is_wanted))
@@ -73,10 +73,15 @@ impl Bench<'_> {
             })
             .collect();
         let files = self.save(what, charts(&drawn))?;
-        Ok(self.wrote(what, &files, Value::Null))
+        Ok(self.wrote(what, &files, None))
     }
 
-    pub(super) fn panels(&self, what: What, rows: &[Vec<Panel>], more: Value) -> Result<Value> {
+    pub(super) fn panels(
+        &self,
+        what: What,
+        rows: &[Vec<Panel>],
+        more: Option<Numbers>,
+    ) -> Result<Made> {
         let files = self.save(what, panels(rows))?;
         Ok(self.wrote(what, &files, more))
     }
@@ -87,7 +92,8 @@ impl Bench<'_> {
         what: What,
         drawing: Result<Drawing, charts::Error>,
     ) -> Result<Vec<PathBuf>> {
-        let Drawing { svg, csv } = drawing.map_err(told)?;
+        let Drawing { svg, csv } =
+            drawing.or_fail(|| format!("the figure {}", what.name()), "another --seeds")?;
         let files = [("svg", svg), ("csv", csv)].map(|(ending, text)| {
             let file = self.folder.join(format!("{}.{ending}", what.name()));
             save(&file, &text).map(|()| file)
@@ -96,12 +102,13 @@ impl Bench<'_> {
     }
 
     /// Figure 1, and the samples of the shapes as files that `train` takes.
-    fn shapes(&self, what: What) -> Result<Value> {
+    fn shapes(&self, what: What) -> Result<Made> {
         let rows = shapes(&self.laboratory).map_err(told)?;
         let mut files = self.save(what, panels(&rows))?;
         let mut known = Vec::new();
         for pair in ShapePair::ALL {
-            let domains = self.laboratory.shape(pair).map_err(told)?;
+            let domains = self.laboratory.shape(pair).map_err(paper::Error::from);
+            let domains = domains.map_err(told)?;
             let (q, x) = (&domains.truth.inputs, &domains.truth.targets);
             let name = pair.name().to_lowercase();
             let file = |part: &str| self.folder.join(format!("{name}-{part}.csv"));
@@ -117,19 +124,19 @@ impl Bench<'_> {
             write_pairs(file("truth"), &domains.truth, &inputs, &targets).map_err(told)?;
             write_pairs(file("ring"), &domains.boundary, &inputs, &targets).map_err(told)?;
             files.extend(["input", "target", "truth", "ring"].map(file));
-            known.push(json!({
-                "data": name,
-                "nodes": q.rows,
-                "matched": domains.boundary.inputs.rows,
-                "volume": domains.target_volume,
-                "dim": domains.target_dimension,
-            }));
+            known.push(Shape {
+                data: name,
+                nodes: q.rows,
+                matched: domains.boundary.inputs.rows,
+                volume: domains.target_volume,
+                dim: domains.target_dimension as u32,
+            });
         }
-        Ok(self.wrote(what, &files, json!(known)))
+        Ok(self.wrote(what, &files, Some(Numbers::Shapes(known))))
     }
 
     /// Figure 3, as many trainings side by side as elsewhere.
-    fn sessions(&self, what: What) -> Result<Value> {
+    fn sessions(&self, what: What) -> Result<Made> {
         let (from, work) = ((&self.laboratory, &self.store), &self.work);
         let mut rows = Vec::new();
         for cells in self.frame.snapshots().chunks(work.threads()) {
@@ -147,11 +154,11 @@ impl Bench<'_> {
                 rows.push(row.map_err(|error| work.failed(error))?);
             }
         }
-        self.panels(what, &rows, Value::Null)
+        self.panels(what, &rows, None)
     }
 
     /// Figure 6: of the seeds the one that folds (SP1) or twists (SP3) most.
-    fn fold_and_twist(&self, what: What) -> Result<Value> {
+    fn fold_and_twist(&self, what: What) -> Result<Made> {
         let mut row = Vec::new();
         let mut found = Vec::new();
         for (word, cells) in ["fold", "twist"]
@@ -201,18 +208,18 @@ impl Bench<'_> {
                 )
             };
             self.work.say(&self.tell, &text);
-            found.push(json!({
-                "wanted": word,
-                "found": size > 0.0,
-                "data": cell.source.name(),
-                "cost": cell.row.slug(),
-                "seed": cell.seed,
-                "flipped_share": flipped,
-                "d_knn": d_knn,
-            }));
+            found.push(Fold {
+                wanted: word,
+                found: size > 0.0,
+                data: cell.source.name().to_owned(),
+                cost: cell.row.slug().to_owned(),
+                seed: cell.seed,
+                flipped_share: flipped,
+                d_knn,
+            });
             row.push(panel);
         }
-        self.panels(what, &[row], json!(found))
+        self.panels(what, &[row], Some(Numbers::Folds(found)))
     }
 }
 

@@ -7,14 +7,14 @@ use charts::hand_gripper::{gripper, hand, key};
 use charts::{Sketch, sketches};
 use glove::hand::{JOINT_COUNT, JOINT_NAMES};
 use paper::figure::{Shown, principal};
+use paper::plan::What;
 use paper::{Cell, Kept};
-use serde_json::{Value, json};
 use trainer::data::Matrix;
 use trainer::hand::table3::POSES;
 
 use super::Bench;
-use super::what::What;
 use crate::played;
+use crate::results::paper::{Made, Numbers, Pair};
 use host::failure::told;
 use host::session::record::{AXES, AXIS_NAMES};
 use host::training::motion::Motion;
@@ -40,7 +40,7 @@ struct Six {
 
 impl Bench<'_> {
     /// Figure 9: a hand and a gripper for each pair.
-    pub(super) fn chosen_pairs(&self, what: What, done: &[(Cell, Kept)]) -> Result<Value> {
+    pub(super) fn chosen_pairs(&self, what: What, done: &[(Cell, Kept)]) -> Result<Made> {
         let pairs = done
             .first()
             .map(|(_, kept)| kept.pairs.clone())
@@ -73,13 +73,16 @@ impl Bench<'_> {
             });
             let like = like.unwrap_or_default();
             let _ = writeln!(csv, "{},\"{like}\",{},{}", number + 1, joined(q), joined(x));
-            names.push(json!({ "target": x, "like": like }));
+            names.push(Pair {
+                target: x.to_vec(),
+                like,
+            });
         }
-        self.sketches(what, &[hands, grippers], csv, json!(names))
+        self.sketches(what, &[hands, grippers], csv, Some(Numbers::Pairs(names)))
     }
 
     /// Figure 12: six seconds of motion, every second of the 25 poses drawn.
-    pub(super) fn trajectory(&self, what: What) -> Result<Value> {
+    pub(super) fn trajectory(&self, what: What) -> Result<Made> {
         let Six {
             hands, grippers, ..
         } = self.motion()?;
@@ -110,11 +113,11 @@ impl Bench<'_> {
             ]
         };
         let [first, second] = [half(0..=12), half(12..=24)];
-        self.sketches(what, &[first, second].concat(), csv, Value::Null)
+        self.sketches(what, &[first, second].concat(), csv, None)
     }
 
     /// Figure 13.
-    pub(super) fn principal_axes(&self, what: What, done: &[(Cell, Kept)]) -> Result<Value> {
+    pub(super) fn principal_axes(&self, what: What, done: &[(Cell, Kept)]) -> Result<Made> {
         let cell = self.frame.hand_map();
         let prepared = self.laboratory.prepare(&cell).map_err(told)?;
         let model = self.store.model(&cell).map_err(told)?;
@@ -155,7 +158,7 @@ impl Bench<'_> {
                 ends: ["x0", "x24"],
             },
         );
-        self.panels(what, &[vec![hands, grippers]], Value::Null)
+        self.panels(what, &[vec![hands, grippers]], None)
     }
 
     fn sketches(
@@ -163,8 +166,8 @@ impl Bench<'_> {
         what: What,
         rows: &[Vec<Sketch>],
         csv: String,
-        more: Value,
-    ) -> Result<Value> {
+        more: Option<Numbers>,
+    ) -> Result<Made> {
         let files = self.save(what, sketches(rows, &key(), csv))?;
         Ok(self.wrote(what, &files, more))
     }

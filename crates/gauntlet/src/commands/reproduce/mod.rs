@@ -3,29 +3,30 @@
 mod figures;
 mod hand_figures;
 mod tables;
-mod what;
 mod work;
 
 use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use glove::hand::LIMITS;
+use paper::plan::{Frame, What};
 use paper::{Laboratory, Source, Store};
-use serde_json::{Value, json};
 use trainer::algorithm;
 use trainer::network::Initialisation;
 use trainer::optimizer::LearningRate;
 
 use super::train::{Schedule, deviation};
 use crate::progress::Person;
+use crate::results;
+use crate::results::paper::{Made, Numbers, Reproduced};
 use crate::tell::Tell;
-use crate::{out, outputs, reading};
+use crate::{outputs, reading};
 use host::failure::{OrFail, told};
 use host::interrupt::Interrupt;
 use host::stats::seconds;
 use host::training::motion::Motion;
-use what::{Frame, What};
 use work::Work;
 
 /// Options of `reproduce`.
@@ -43,7 +44,7 @@ Everything goes into the folder --out: tables as text and CSV, figures as SVG wi
 Figures 7 and 8 show a hand's bones and the hardware; there is nothing to compute.")]
 pub struct Reproduce {
     /// Tables and figures.
-    #[arg(required = true, value_enum)]
+    #[arg(required = true, value_name = "WHAT", value_parser = what())]
     what: Vec<What>,
     /// The folder for results.
     #[arg(long, value_name = "FOLDER", default_value = "reproduction")]
@@ -71,7 +72,16 @@ pub struct Reproduce {
     threads: Option<u16>,
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
-    json: bool,
+    pub json: bool,
+}
+
+fn what() -> impl TypedValueParser<Value = What> {
+    let names = What::EVERY.map(|(_, name, about)| PossibleValue::new(name).help(about));
+    PossibleValuesParser::new(names).try_map(|typed| {
+        let mut every = What::EVERY.into_iter();
+        let found = every.find(|(_, name, _)| *name == typed);
+        found.map(|(what, ..)| what).ok_or("no table or figure")
+    })
 }
 
 /// Trainings of seconds: maps take shape, not more.
@@ -131,7 +141,7 @@ pub(super) struct Bench<'a> {
 ///
 /// # Errors
 /// A failure that names the file or the training, or says that the run was stopped and how it goes on.
-pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
+pub(crate) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let motion = match &options.poses {
         Some(path) => Some(reading::ended_by(interrupt, "the recording", || {
@@ -164,18 +174,19 @@ pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
         work,
         tell,
     };
-    let mut results = Vec::new();
+    let mut made = Vec::new();
     for what in wanted {
-        results.push(bench.make(what)?);
+        made.push(bench.make(what)?);
     }
     let took = bench.work.finish();
     if options.json {
-        return out::json(&json!({
-            "folder": options.out,
-            "seeds": frame.seeds,
-            "took_s": took.as_secs_f64(),
-            "results": results,
-        }));
+        let reproduced = Reproduced {
+            folder: &options.out,
+            seeds: frame.seeds,
+            took_s: took.as_secs_f64(),
+            results: made,
+        };
+        return results::print("reproduce", reproduced);
     }
     tell.say(format_args!("done       in {}", seconds(took)));
     Ok(())
@@ -183,7 +194,7 @@ pub(super) fn run(options: &Reproduce, interrupt: &Interrupt) -> Result<()> {
 
 impl Bench<'_> {
     /// Trains for a table or a figure and writes it.
-    fn make(&self, what: What) -> Result<Value> {
+    fn make(&self, what: What) -> Result<Made> {
         let done = self
             .work
             .train(&self.laboratory, &self.store, &self.frame.cells(what))?;
@@ -194,7 +205,7 @@ impl Bench<'_> {
     }
 
     /// Says where a result is.
-    fn wrote(&self, what: What, files: &[PathBuf], more: Value) -> Value {
+    fn wrote(&self, what: What, files: &[PathBuf], result: Option<Numbers>) -> Made {
         let names: Vec<String> = files
             .iter()
             .map(|file| file.display().to_string())
@@ -203,7 +214,11 @@ impl Bench<'_> {
             &self.tell,
             &format!("{:<10} {}", what.name(), names.join(", ")),
         );
-        json!({ "what": what.name(), "files": names, "result": more })
+        Made {
+            what: what.name().to_owned(),
+            files: names,
+            result,
+        }
     }
 }
 

@@ -5,9 +5,9 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 use anyhow::Result;
+use paper::plan::{Frame, What};
 use paper::{Cell, Error, Kept, Laboratory, Store, Watch, run_all};
 
-use super::what::{Frame, What};
 use crate::progress::Progress;
 use crate::tell::Tell;
 use host::failure::{Failure, told};

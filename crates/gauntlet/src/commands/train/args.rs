@@ -6,7 +6,7 @@ use clap::{ArgGroup, Args, ValueEnum};
 use host::lines::Model;
 use host::training::PairChoice;
 
-use crate::commands::gripper::model_parser;
+use crate::options::model_parser;
 use trainer::cost::Cost;
 use trainer::measures::Coverage;
 

@@ -7,6 +7,7 @@ use bridge::protocol::message::{Refusal, SETTING_NAMES, VERSION};
 use super::Address;
 use crate::failure::Failure;
 use crate::lines::port::OpenError;
+use crate::next::{Command, NextStep, advice};
 
 /// Why a bridge did not do what it was asked.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -36,7 +37,7 @@ pub enum Error {
         heard: Heard,
     },
     /// The bridge's own word.
-    #[error("the bridge refuses: {}", refusal_words(.0).0)]
+    #[error("the bridge refuses: {}", refusal_words(.0))]
     Refused(Refusal),
     /// It speaks an older version of the protocol, which lacks this.
     #[error(
@@ -148,100 +149,108 @@ impl Error {
     }
 }
 
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        let next = match &error {
-            Error::Open(error) => return error.clone().into(),
-            Error::Connect { .. } => "starting the emulator first, and its socket's path".to_owned(),
-            Error::Lost => "the cable, and the bridge's power; then the same command again".to_owned(),
-            Error::Silent { heard, .. } if heard.unknown > 0 => {
-                "the tool and the firmware of the same release".to_owned()
+impl Error {
+    /// As a person is told it, who reaches the bridge at `bridge`.
+    pub fn at(self, bridge: &Address) -> Failure {
+        let next = match &self {
+            Self::Open(error) => return error.clone().into(),
+            Self::Connect { .. } => "starting the emulator first, and its socket's path".into(),
+            Self::Lost => "the cable, and the bridge's power; then the same command again".into(),
+            Self::Silent { heard, .. } if heard.unknown > 0 => {
+                "the tool and the firmware of the same release".into()
             }
-            Error::Older { .. } => {
-                "this release's firmware in the bridge: `cargo xtask firmware` builds it; weights can be flashed as it is".to_owned()
+            Self::Older { .. } => {
+                "this release's firmware in the bridge: `cargo xtask firmware` builds it; weights can be flashed as it is".into()
             }
-            Error::Silent { heard, .. } if heard.echoes > 0 => {
-                "the wiring: the line sends back what is sent to it, and no bridge answers; TX and RX bridged, or a program that echoes".to_owned()
+            Self::Silent { heard, .. } if heard.echoes > 0 => {
+                "the wiring: the line sends back what is sent to it, and no bridge answers; TX and RX bridged, or a program that echoes".into()
             }
-            Error::Silent { heard, .. } if heard.bytes > 0 => {
-                "that this is UART 0 of a bridge, 115200 baud at both ends, and that no other program speaks on this line".to_owned()
+            Self::Silent { heard, .. } if heard.bytes > 0 => {
+                "that this is UART 0 of a bridge, 115200 baud at both ends, and that no other program speaks on this line".into()
             }
-            Error::Silent {
+            Self::Silent {
                 address: Address::Unix(_) | Address::Tcp(_),
                 ..
             } => {
-                "ending the other program that has this socket, which serves one at a time; else starting the emulator again".to_owned()
+                "ending the other program that has this socket, which serves one at a time; else starting the emulator again".into()
             }
-            Error::Silent { .. } => {
-                "the bridge's power, and that this is its UART 0".to_owned()
-            }
-            Error::Refused(refusal) => refusal_words(refusal).1,
-            Error::Confused(_) => "the same command again; the tool and the firmware of the same release".to_owned(),
-            Error::TooLong => "the tool of the same release as the firmware".to_owned(),
-            Error::ReadBack { .. } => "the same command again; if it stays so, the flash is worn out".to_owned(),
-            Error::Breaking { .. } => "another cable or socket; then the same command again: it goes on where it was, unless the bridge restarted".to_owned(),
-            Error::Stopped { .. } => "the same command again: it goes on where it stopped, unless the bridge restarted".to_owned(),
+            Self::Silent { .. } => "the bridge's power, and that this is its UART 0".into(),
+            Self::Refused(refusal) => refusal_next(refusal, bridge),
+            Self::Confused(_) => "the same command again; the tool and the firmware of the same release".into(),
+            Self::TooLong => "the tool of the same release as the firmware".into(),
+            Self::ReadBack { .. } => "the same command again; if it stays so, the flash is worn out".into(),
+            Self::Breaking { .. } => "another cable or socket; then the same command again: it goes on where it was, unless the bridge restarted".into(),
+            Self::Stopped { .. } => "the same command again: it goes on where it stopped, unless the bridge restarted".into(),
         };
-        Self::new(error.to_string(), next)
+        Failure::new(self.to_string(), next)
     }
 }
 
-/// What a refusal means, and what to do.
-pub fn refusal_words(refusal: &Refusal) -> (String, String) {
+/// For who does not know where the bridge is: PORT stands for it in commands.
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        error.at(&Address::Serial("PORT".into()))
+    }
+}
+
+/// What a refusal means.
+pub fn refusal_words(refusal: &Refusal) -> String {
     match refusal {
-        Refusal::Version { bridge } => (
-            format!("it speaks version {bridge} of the host protocol, this tool version {VERSION}"),
-            "the tool and the firmware of the same release".to_owned(),
-        ),
-        Refusal::NoSession => (
-            "it does not know this session: it restarted, or heard nothing for 2 s".to_owned(),
-            "the same command again".to_owned(),
-        ),
-        Refusal::Busy { session } => (
-            format!(
-                "another host has it (session {session:08x}): it keeps the clutch closed or writes weights"
-            ),
-            "ending the other program, then 2 s of patience".to_owned(),
-        ),
-        Refusal::Engaged | Refusal::Store(bridge::store::Error::Engaged) => (
-            "its clutch is closed".to_owned(),
-            "opening the clutch first: end the `gauntlet bridge engage` that keeps it closed, or, where its host is gone, `gauntlet bridge release`"
-                .to_owned(),
-        ),
-        // The store's own words name requests of the protocol; a person types these.
-        Refusal::Store(bridge::store::Error::Busy) => (
-            "a weights image was begun and did not end".to_owned(),
-            "`gauntlet flash` with the same file, which goes on; or `gauntlet bridge reboot`, which gives the image up"
-                .to_owned(),
-        ),
-        Refusal::Store(error) => {
-            let text = error.to_string();
-            match text.rsplit_once(": ") {
-                Some((what, next)) => (what.to_owned(), next.to_owned()),
-                None => (text, String::new()),
-            }
+        Refusal::Version { bridge } => {
+            format!("it speaks version {bridge} of the host protocol, this tool version {VERSION}")
         }
-        Refusal::Heartbeat(why) => (
-            why.to_string(),
-            "closing the clutch again, if that is what you want".to_owned(),
+        Refusal::NoSession => {
+            "it does not know this session: it restarted, or heard nothing for 2 s".to_owned()
+        }
+        Refusal::Busy { session } => format!(
+            "another host has it (session {session:08x}): it keeps the clutch closed or writes weights"
         ),
+        Refusal::Engaged | Refusal::Store(bridge::store::Error::Engaged) => {
+            "its clutch is closed".to_owned()
+        }
+        // The store's own words name requests of the protocol; a person types these.
+        Refusal::Store(bridge::store::Error::Busy) => {
+            "a weights image was begun and did not end".to_owned()
+        }
+        Refusal::Store(error) => error.problem().to_string(),
+        Refusal::Heartbeat(why) => why.to_string(),
         Refusal::Configuration {
             key,
             value,
             least,
             greatest,
-        } => (
-            format!(
-                "{} is {value}, outside {least} to {greatest}",
-                SETTING_NAMES
-                    .get(usize::from(*key))
-                    .unwrap_or(&"a setting this tool does not know")
-            ),
-            format!("a value from {least} to {greatest}"),
+        } => format!(
+            "{} is {value}, outside {least} to {greatest}",
+            SETTING_NAMES
+                .get(usize::from(*key))
+                .unwrap_or(&"a setting this tool does not know")
         ),
-        Refusal::Period { least_ms } => (
-            format!("telemetry comes every {least_ms} ms at the fastest"),
-            format!("a period of {least_ms} ms or more"),
-        ),
+        Refusal::Period { least_ms } => {
+            format!("telemetry comes every {least_ms} ms at the fastest")
+        }
+    }
+}
+
+/// What to do about it, at the bridge at `bridge`.
+pub fn refusal_next(refusal: &Refusal, bridge: &Address) -> NextStep {
+    let command = |verb: &str| Command::gauntlet(verb).option("--bridge", bridge);
+    match refusal {
+        Refusal::Version { .. } => "the tool and the firmware of the same release".into(),
+        Refusal::NoSession => "the same command again".into(),
+        Refusal::Busy { .. } => "ending the other program, then 2 s of patience".into(),
+        Refusal::Engaged | Refusal::Store(bridge::store::Error::Engaged) => advice(
+            "opening the clutch first: end the `bridge engage` that keeps it closed, or, where its host is gone, ",
+        )
+        .then(command("bridge release")),
+        Refusal::Store(bridge::store::Error::Busy) => command("flash MODEL")
+            .then(" with the same file, which goes on; or ")
+            .then(command("bridge reboot"))
+            .then(", which gives the image up"),
+        Refusal::Store(error) => error.remedy().to_string().into(),
+        Refusal::Heartbeat(_) => "closing the clutch again, if that is what you want".into(),
+        Refusal::Configuration {
+            least, greatest, ..
+        } => format!("a value from {least} to {greatest}").into(),
+        Refusal::Period { least_ms } => format!("a period of {least_ms} ms or more").into(),
     }
 }

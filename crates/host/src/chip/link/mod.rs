@@ -22,7 +22,7 @@ use bridge::protocol::message::{
 };
 
 pub use clutch::Heartbeat;
-pub use error::{Error, Heard, refusal_words};
+pub use error::{Error, Heard, refusal_next, refusal_words};
 pub use flash::Flashed;
 pub use line::Address;
 use line::Line;

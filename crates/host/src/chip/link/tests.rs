@@ -303,8 +303,16 @@ fn a_refusal_is_told_in_one_line_with_its_next_step() {
 
 #[test]
 fn an_image_that_did_not_end_is_told_with_commands_that_a_person_can_type() {
-    let (_, next) = refusal_words(&Refusal::Store(bridge::store::Error::Busy));
-    assert!(next.contains("`gauntlet flash`") && next.contains("`gauntlet bridge reboot`"));
+    let at = Address::Serial("/dev/b".into());
+    let next = refusal_next(&Refusal::Store(bridge::store::Error::Busy), &at);
+    let commands: Vec<String> = next.commands().map(ToString::to_string).collect();
+    assert_eq!(
+        commands,
+        [
+            "gauntlet flash MODEL --bridge /dev/b",
+            "gauntlet bridge reboot --bridge /dev/b"
+        ]
+    );
 }
 
 #[test]
@@ -338,7 +346,8 @@ fn two_hosts_and_every_other_refusal_have_words_and_a_next_step() {
         ),
     ];
     for (refusal, word) in refusals {
-        let (what, next) = refusal_words(&refusal);
+        let what = refusal_words(&refusal);
+        let next = refusal_next(&refusal, &Address::Serial("/dev/b".into()));
         assert!(what.contains(word), "{refusal:?}: {what}");
         assert!(!next.is_empty(), "{refusal:?}");
     }

@@ -9,6 +9,7 @@ use crate::diagnose::Findings;
 use crate::diagnose::raw::{self, Expect, Heard, hex, listen, text};
 use crate::interrupt::Interrupt;
 use crate::lines::port::Port;
+use crate::next::{Command, advice};
 
 /// For the first answer, however late.
 const FIRST_WAIT: Duration = Duration::from_millis(500);
@@ -168,7 +169,9 @@ impl Survey {
                 middle.as_millis(),
                 slack.as_millis()
             );
-            let next = "an adapter with a latency timer of 1 ms (`gauntlet ports`), on this machine and not behind a tunnel";
+            let next = advice("an adapter with a latency timer of 1 ms (")
+                .then(Command::gauntlet("ports"))
+                .then("), on this machine and not behind a tunnel");
             findings.wrong("bridge", what, next);
         }
     }
@@ -206,7 +209,9 @@ pub fn nobody(seen: &[(u32, Survey)], findings: &mut Findings) {
                 survey.unasked.len(),
                 shown(&survey.unasked)
             ),
-            "whether this is the glove's port (`gauntlet ports`): something that talks by itself is on it",
+            advice("whether this is the glove's port (")
+                .then(Command::gauntlet("ports"))
+                .then("): something that talks by itself is on it"),
         );
     }
     let noisy = seen
@@ -222,7 +227,9 @@ pub fn nobody(seen: &[(u32, Survey)], findings: &mut Findings) {
         return findings.wrong(
             "bridge",
             format!("no byte comes: no OK, no I2CStat; asked at {speeds} baud"),
-            "the glove's power, TX against RX, and whether this is the gripper's port (`gauntlet ports`)",
+            advice("the glove's power, TX against RX, and whether this is the gripper's port (")
+                .then(Command::gauntlet("ports"))
+                .then(")"),
         );
     };
     findings.wrong(

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use rustix::io::Errno;
 
 use crate::failure::Failure;
+use crate::next::{Command, advice};
 
 /// Why a port could not be opened.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -61,26 +62,23 @@ fn link_note(target: Option<&Path>) -> String {
 impl From<OpenError> for Failure {
     fn from(error: OpenError) -> Self {
         let next = match &error {
-            OpenError::Missing { target: None, .. } => {
-                "plug the adapter in, and `gauntlet ports` to see the ports there are".to_owned()
-            }
-            OpenError::Missing { .. } => {
-                "start whatever makes the link (`gauntlet simulate`, say) again".to_owned()
-            }
+            OpenError::Missing { target: None, .. } => advice("plug the adapter in, and ")
+                .then(Command::gauntlet("ports"))
+                .then(" to see the ports there are"),
+            OpenError::Missing { .. } => advice("start whatever makes the link (")
+                .then(Command::gauntlet("simulate"))
+                .then(", say) again"),
             OpenError::Permission { group, .. } => {
-                format!("`sudo usermod -aG {group} $USER`, then log out and in again")
+                format!("`sudo usermod -aG {group} $USER`, then log out and in again").into()
             }
-            OpenError::Busy { path } => {
-                format!(
-                    "`fuser -v {}` to see which program, and end it",
-                    path.display()
-                )
-            }
+            OpenError::Busy { path } => Command::program("fuser")
+                .path("-v", path)
+                .then(" to see which program, and end it"),
             OpenError::NotSerial { .. } => {
-                "`gauntlet ports` to see the serial ports there are".to_owned()
+                Command::gauntlet("ports").then(" to see the serial ports there are")
             }
             OpenError::System { .. } => {
-                "another adapter or cable, and `dmesg` for what the system says".to_owned()
+                "another adapter or cable, and `dmesg` for what the system says".into()
             }
         };
         Self::new(error.to_string(), next)

@@ -1,68 +1,77 @@
 //! The tables and figures by name, and the trainings that each of them needs.
 
-use clap::ValueEnum;
-use paper::shapes::ShapePair;
-use paper::{Cell, Row, Source, Table};
+use crate::shapes::ShapePair;
+use crate::{Cell, Row, Source, Table};
 use trainer::algorithm::Schedule;
 use trainer::network::Initialisation;
 
 /// A table or a figure of the paper. Figures 7 and 8 show a hand's bones and the hardware: nothing to compute.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-#[allow(missing_docs, reason = "the help text says it")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs, reason = "What::EVERY says it")]
 pub enum What {
-    /// Everything below.
     All,
-    /// The seven costs on SP1 to SP4, four pairs, with the t-tests of §3.2.3.
     Table2,
-    /// The seven costs on a hand, eight pairs.
     Table4,
-    /// The four pairs of shapes with ten matched points.
     Fig1,
-    /// The measures over the epochs, SP1.
     Fig2,
-    /// The map at the end of each session, SP1 to SP4.
     Fig3,
-    /// Volume occupancy over the number of pairs, SP1.
     Fig4,
-    /// NMSE over the number of pairs, SP1.
     Fig5,
-    /// A fold and a twist, coloured by each point's d-Knn.
     Fig6,
-    /// The pairs that were chosen, as hand and gripper.
     Fig9,
-    /// The measures over the number of pairs, hand.
     Fig10,
-    /// The measures over the epochs, hand.
     Fig11,
-    /// Six seconds of motion, as hand and gripper.
     Fig12,
-    /// Hand poses and gripper poses along their principal axes.
     Fig13,
-    /// Distortion over the epochs, SP2 to SP4.
     Fig14,
-    /// Volume occupancy over the epochs, SP2 to SP4.
     Fig15,
-    /// d-Knn over the epochs, SP2 to SP4.
     Fig16,
-    /// NMSE over the epochs, SP2 to SP4.
     Fig17,
-    /// Volume occupancy over the number of pairs, SP2 to SP4.
     Fig18,
-    /// NMSE over the number of pairs, SP2 to SP4.
     Fig19,
 }
 
+/// A table or a figure, how it is typed (files have the same names), and what it shows.
+pub type Named = (What, &'static str, &'static str);
+
 impl What {
-    /// For file names.
-    pub fn name(self) -> String {
-        self.to_possible_value()
-            .map_or_else(String::new, |value| value.get_name().to_owned())
+    /// All of them in the paper's order, [`What::All`] first.
+    #[rustfmt::skip]
+    pub const EVERY: [Named; 20] = [
+        (Self::All, "all", "Everything below"),
+        (Self::Table2, "table2", "The seven costs on SP1 to SP4, four pairs, with the t-tests of §3.2.3"),
+        (Self::Table4, "table4", "The seven costs on a hand, eight pairs"),
+        (Self::Fig1, "fig1", "The four pairs of shapes with ten matched points"),
+        (Self::Fig2, "fig2", "The measures over the epochs, SP1"),
+        (Self::Fig3, "fig3", "The map at the end of each session, SP1 to SP4"),
+        (Self::Fig4, "fig4", "Volume occupancy over the number of pairs, SP1"),
+        (Self::Fig5, "fig5", "NMSE over the number of pairs, SP1"),
+        (Self::Fig6, "fig6", "A fold and a twist, coloured by each point's d-Knn"),
+        (Self::Fig9, "fig9", "The pairs that were chosen, as hand and gripper"),
+        (Self::Fig10, "fig10", "The measures over the number of pairs, hand"),
+        (Self::Fig11, "fig11", "The measures over the epochs, hand"),
+        (Self::Fig12, "fig12", "Six seconds of motion, as hand and gripper"),
+        (Self::Fig13, "fig13", "Hand poses and gripper poses along their principal axes"),
+        (Self::Fig14, "fig14", "Distortion over the epochs, SP2 to SP4"),
+        (Self::Fig15, "fig15", "Volume occupancy over the epochs, SP2 to SP4"),
+        (Self::Fig16, "fig16", "d-Knn over the epochs, SP2 to SP4"),
+        (Self::Fig17, "fig17", "NMSE over the epochs, SP2 to SP4"),
+        (Self::Fig18, "fig18", "Volume occupancy over the number of pairs, SP2 to SP4"),
+        (Self::Fig19, "fig19", "NMSE over the number of pairs, SP2 to SP4"),
+    ];
+
+    /// As it is typed, and for file names.
+    pub fn name(self) -> &'static str {
+        let mut every = Self::EVERY.iter();
+        every
+            .find(|(what, ..)| *what == self)
+            .map_or("", |(_, name, _)| name)
     }
 
     /// `all` taken apart, doubles left out, in the paper's order.
     pub fn each(wanted: &[Self]) -> Vec<Self> {
         let all = wanted.contains(&Self::All);
-        let each = Self::value_variants().iter().copied();
+        let each = Self::EVERY.into_iter().map(|(what, ..)| what);
         each.filter(|what| *what != Self::All && (all || wanted.contains(what)))
             .collect()
     }

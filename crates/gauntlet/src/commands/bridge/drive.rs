@@ -1,0 +1,181 @@
+//! Runs of a bridge on a chip: calibrated, engaged, watched, recorded.
+
+use std::path::Path;
+use std::sync::mpsc::SyncSender;
+use std::time::Duration;
+
+use anyhow::Result;
+use bridge::calibration::{Refusal, Try};
+use bridge::protocol::message::{Health, Sample};
+
+use super::args::BridgeAt;
+use super::poses::Poses;
+use crate::outputs;
+use crate::results::{self, devices, runs};
+use crate::run::{Finished, Options, Run};
+use crate::tell::Tell;
+use host::chip::link::HostLink;
+use host::clock::Clock;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::session::{Devices, OnChip, refused};
+
+pub(super) fn engage(
+    at: &BridgeAt,
+    calibrate: bool,
+    activate: bool,
+    seconds: Option<Duration>,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let tell = Tell::new(at.json);
+    let mut link = at.connect()?;
+    // An older bridge is refused before anything moves.
+    at.told(link.health())?;
+    let mut run = start(link, None, at.devices(), interrupt)?;
+    let ready = ready(&mut run, calibrate, activate, &tell);
+    let began = matches!(ready, Ok(true));
+    let driven = ready.and_then(|ready| match ready {
+        true => drive(&mut run, "gauntlet bridge engage", seconds, true, at.json),
+        false => Ok(()),
+    });
+    let finished = run.finish();
+    if !began {
+        return finished.judge(driven);
+    }
+    if let Some(left) = finished.left() {
+        tell.say(format_args!("the clutch is open: {left}"));
+    }
+    finish("bridge engage", at, finished, None, driven)
+}
+
+/// What comes before the clutch may close. Returns whether to go on.
+fn ready(run: &mut Run, calibrate: bool, activate: bool, tell: &Tell) -> Result<bool> {
+    Ok((!calibrate || run.calibrate(tell)?) && (!activate || run.activate(tell)?))
+}
+
+/// A run of the bridge behind `link`.
+pub(crate) fn start(
+    link: HostLink,
+    samples: Option<SyncSender<Sample>>,
+    devices: Devices,
+    interrupt: &Interrupt,
+) -> Result<Run> {
+    let clock = Clock::start();
+    let session = OnChip::start(link, clock, samples)?;
+    Ok(Run::new(session, None, clock, interrupt.clone(), devices))
+}
+
+fn drive(
+    run: &mut Run,
+    title: &'static str,
+    seconds: Option<Duration>,
+    engage: bool,
+    quiet: bool,
+) -> Result<()> {
+    let options = Options {
+        title,
+        seconds,
+        engage,
+        drives: engage,
+        quiet,
+    };
+    run.drive(&options).map(drop)
+}
+
+pub(super) fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(at.json);
+    let mut link = at.connect()?;
+    if undo {
+        at.told(link.undo_calibration())?;
+        let health = at.told(link.health())?;
+        if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
+            return Err(refused(why, &at.devices()).into());
+        }
+        tell.say(format_args!("the newest calibration was taken back"));
+        if at.json {
+            return results::print("bridge calibrate", devices::Calibrated { health: &health });
+        }
+        return Ok(());
+    }
+    // An older bridge is refused by name.
+    let health = at.told(link.health())?;
+    let mut run = start(link, None, at.devices(), interrupt)?;
+    let taken = run.calibrate(&tell).and_then(|taken| match taken {
+        true => Ok(()),
+        false => Err(Failure::interrupted("before the hand was taken").into()),
+    });
+    let now = run.snapshot().map(|seen| seen.calibration);
+    run.finish().judge_prepared(taken)?;
+    if at.json {
+        let calibration = now.unwrap_or(health.calibration);
+        let health = Health {
+            calibration,
+            ..health
+        };
+        return results::print("bridge calibrate", devices::Calibrated { health: &health });
+    }
+    Ok(())
+}
+
+pub(super) fn monitor(
+    at: &BridgeAt,
+    seconds: Option<Duration>,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let mut run = start(at.connect()?, None, at.devices(), interrupt)?;
+    let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
+    finish("bridge monitor", at, run.finish(), None, driven)
+}
+
+pub(super) fn log(
+    at: &BridgeAt,
+    path: &Path,
+    seconds: Option<Duration>,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let tell = Tell::new(at.json);
+    outputs::check_new(path)?;
+    let link = at.connect()?;
+    let (poses, samples) = Poses::create(path, interrupt)?;
+    let driven = start(link, Some(samples), at.devices(), interrupt).map(|mut run| {
+        let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
+        (run.finish(), driven)
+    });
+    let rows = poses.finish()?;
+    let (finished, driven) = driven?;
+    match rows {
+        0 => tell.say(format_args!(
+            "log        none: no pose came, so that no file was left"
+        )),
+        rows => tell.say(format_args!(
+            "log        {} with {rows} poses",
+            path.display()
+        )),
+    }
+    let poses = runs::Poses { path, rows };
+    finish("bridge log", at, finished, Some(poses), driven)
+}
+
+/// The numbers, then the judgement over all of it.
+fn finish(
+    verb: &'static str,
+    at: &BridgeAt,
+    finished: Finished,
+    poses: Option<runs::Poses<'_>>,
+    driven: Result<()>,
+) -> Result<()> {
+    if at.json {
+        let result = runs::Run {
+            poses,
+            ..finished.result()
+        };
+        results::print(verb, result)?;
+    } else {
+        let tell = Tell::new(false);
+        let lines = finished.summary.lines();
+        lines
+            .iter()
+            .for_each(|line| tell.say(format_args!("{line}")));
+    }
+    finished.judge(driven)
+}

@@ -1,0 +1,150 @@
+//! What a bridge does, what its slots hold, and its counters.
+
+use anyhow::Result;
+use bridge::calibration::Try;
+use bridge::protocol::message::{Health, Restart, Status};
+use gripper::{Activation, Fault};
+
+use super::args::BridgeAt;
+use crate::commands::flash::slot_lines;
+use crate::results::{self, devices};
+use crate::tell::Tell;
+use host::chip::link::Error;
+use host::words;
+
+/// Shows all of it.
+///
+/// # Errors
+/// A failure that names the line, or what the bridge refuses.
+pub(super) fn status(at: &BridgeAt) -> Result<()> {
+    let mut link = at.connect()?;
+    let hello = link.hello();
+    let status = at.told(link.status())?;
+    let slots = at.told(link.slots())?;
+    let counters = at.told(link.counters())?;
+    // A bridge of version 2 has none.
+    let health = match link.health() {
+        Err(Error::Older { .. }) => None,
+        health => Some(at.told(health)?),
+    };
+    if at.json {
+        let bridge = devices::Bridge {
+            hello: hello.as_ref(),
+            status: &status,
+            slots: &slots,
+            counters: &counters,
+            health: health.as_ref(),
+        };
+        return results::print("bridge status", bridge);
+    }
+    let tell = Tell::new(false);
+    if let Some(hello) = hello {
+        let [inputs, hidden, outputs] = hello.shape;
+        tell.say(format_args!(
+            "bridge     protocol {}, map {inputs} → {hidden} → {outputs}, images up to {} bytes, up for {:.1} s",
+            hello.version,
+            hello.capacity,
+            status.now_us as f64 / 1e6
+        ));
+    }
+    tell.say(format_args!(
+        "state      {}, clutch {}",
+        status.state,
+        clutch_words(&status, at)
+    ));
+    for fault in standing_faults(&status) {
+        tell.say(format_args!("fault      {fault}"));
+    }
+    if let Some(health) = &health {
+        health_lines(health, at)
+            .iter()
+            .for_each(|line| tell.say(format_args!("{line}")));
+    }
+    if let Some(gripper) = &status.gripper {
+        tell.say(format_args!(
+            "gripper    {}, at {:?}",
+            words::activation(gripper.activation),
+            gripper.position.as_slice()
+        ));
+    }
+    slot_lines(&slots)
+        .iter()
+        .for_each(|line| tell.say(format_args!("{line}")));
+    if let Some((there, announced)) = status.transfer {
+        tell.say(format_args!(
+            "transfer   {there} of {announced} bytes, not ended: `{}` goes on with it, `{}` gives it up",
+            at.command("flash MODEL"),
+            at.command("bridge reboot")
+        ));
+    }
+    tell.say(format_args!(
+        "counters   {} frames, {} to follow, {} of those answered; {} commands; {} gripper cycles, {} errors; bytes lost {:?} (host, glove, gripper)",
+        counters.frames,
+        counters.following_frames,
+        counters.answered_frames,
+        counters.commands,
+        counters.statuses,
+        counters.gripper_errors,
+        counters.bytes_lost
+    ));
+    if counters.stack_used > 0 {
+        tell.say(format_args!(
+            "stack      {} bytes at most so far",
+            counters.stack_used
+        ));
+    }
+    Ok(())
+}
+
+fn health_lines(health: &Health, at: &BridgeAt) -> Vec<String> {
+    let calibration = match (health.calibration.is_calibrated, health.calibration.newest) {
+        (true, _) => "calibrated".to_owned(),
+        (false, Try::Refused(why)) => format!("not calibrated: {why}"),
+        (false, _) => format!(
+            "not calibrated: `{}` does it",
+            at.command("bridge calibrate")
+        ),
+    };
+    let restart = match health.restart {
+        Restart::Unknown => "for a reason the board cannot tell",
+        Restart::Power => "by power or its reset pin",
+        Restart::Software => "by request, or after a fault of its own",
+        Restart::Watchdog => "by its watchdog: its loop hung",
+    };
+    vec![
+        format!("glove      {calibration}"),
+        format!("started    {restart}; {} stalls since", health.stalls),
+    ]
+}
+
+/// How the clutch is. A host that vanished leaves a hold, which keeps the bridge from other work until it is released.
+fn clutch_words(status: &Status, at: &BridgeAt) -> String {
+    match (status.engaged, status.heartbeat) {
+        (false, _) => "open".to_owned(),
+        (true, true) => "closed".to_owned(),
+        (true, false) => format!(
+            "left by a host that vanished: `{}` ends the hold",
+            at.command("bridge release")
+        ),
+    }
+}
+
+/// What is wrong with the bridge's devices now.
+fn standing_faults(status: &Status) -> Vec<String> {
+    let mut faults = Vec::new();
+    if !status.glove_answers {
+        faults.push("the glove sends no frames".to_owned());
+    }
+    let Some(gripper) = &status.gripper else {
+        faults.push("the gripper does not answer".to_owned());
+        return faults;
+    };
+    if gripper.activation != Activation::Ready {
+        let activation = words::activation(gripper.activation);
+        faults.push(format!("the gripper is {activation}"));
+    }
+    if gripper.fault != Fault::None {
+        faults.push(words::fault(gripper.fault));
+    }
+    faults
+}

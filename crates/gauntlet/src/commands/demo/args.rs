@@ -1,0 +1,69 @@
+//! The options of `demo`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+
+use crate::options::{model_parser, run_time};
+use host::lines::Model;
+
+/// Options of `demo`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet demo
+  gauntlet demo --poses my_hand.csv --log session.mcap
+  gauntlet demo --seconds 60 --json > result.json
+  gauntlet demo --gripper-model 2f85
+  gauntlet demo --on-chip
+
+The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians \
+(thumb_cmc_flex, thumb_cmc_abd, … little_dip_flex; docs/tool.md lists them). \
+Keys while it runs on a terminal: space opens and closes the clutch, q holds the gripper and ends.")]
+pub struct Demo {
+    /// Train on and play this recording of a hand instead of generated motion.
+    #[arg(long, value_name = "FILE.csv")]
+    pub poses: Option<PathBuf>,
+    /// Write every frame, command and status into this session log.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub log: Option<PathBuf>,
+    /// How long to drive the gripper, in seconds (1 to 86400).
+    #[arg(long, value_name = "N", default_value = "20", value_parser = run_time, allow_negative_numbers = true)]
+    pub seconds: Duration,
+    /// Seed of everything random: the same seed trains the same map.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+    /// Begin with no reference pairs, as the paper's experiments do, instead of with open hand and fist.
+    #[arg(long)]
+    pub no_start_pairs: bool,
+    /// Which gripper follows the hand.
+    #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
+    pub gripper_model: Model,
+    /// Run the bridge's ARM firmware in QEMU instead of on this processor.
+    #[arg(long, conflicts_with = "log")]
+    pub on_chip: bool,
+    /// The firmware for --on-chip, instead of the one that `cargo xtask firmware` built.
+    #[arg(long, value_name = "ELF", requires = "on_chip")]
+    pub firmware: Option<PathBuf>,
+    /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl Default for Demo {
+    /// What `gauntlet` without a verb does.
+    fn default() -> Self {
+        Self {
+            poses: None,
+            log: None,
+            seconds: Duration::from_secs(20),
+            seed: 1,
+            no_start_pairs: false,
+            gripper_model: Model::ThreeFinger,
+            on_chip: false,
+            firmware: None,
+            json: false,
+        }
+    }
+}

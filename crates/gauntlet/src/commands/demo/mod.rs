@@ -1,0 +1,132 @@
+//! `gauntlet demo`: the whole path, from a moving hand to a moving gripper, with nothing but this machine.
+
+mod args;
+mod here;
+mod on_chip;
+mod parts;
+
+use anyhow::Result;
+
+use crate::progress::Person;
+use crate::results::{self, runs};
+use crate::run::{End, Finished, Options, Run};
+use crate::tell::Tell;
+use crate::{outputs, reading};
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::stats::seconds;
+use host::training::motion::Motion;
+use parts::Started;
+
+pub use args::Demo;
+
+/// Runs the demo.
+///
+/// # Errors
+/// A failure that says which of its steps did not succeed.
+pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(options.json);
+    if options.on_chip {
+        on_chip::check(options)?;
+    }
+    let motion = reading::ended_by(interrupt, "the recording", || {
+        Motion::open_for_training(options.poses.as_deref(), options.seed, &Person)
+    })?;
+    if let Some(path) = &options.log {
+        outputs::check_new(path)?;
+    }
+    let start = match options.on_chip {
+        true => on_chip::start,
+        false => here::start,
+    };
+    let mut started = start(options, &motion, &tell, interrupt)?;
+    let driven = drive(options, &mut started, &tell);
+    let Started {
+        run,
+        outcome,
+        flashed,
+        home,
+        ..
+    } = started;
+    let finished = run.finish();
+    drop(home);
+    if options.json && finished.ending.is_some() {
+        let result = runs::Demo {
+            motion: motion.describe(),
+            training_s: outcome.took.as_secs_f64(),
+            epochs: outcome.epochs,
+            pairs: outcome.pairs,
+            quality: &outcome.quality,
+            flash: flashed.as_ref(),
+            run: finished.result(),
+        };
+        results::print("demo", result)?;
+    } else {
+        say(&finished, &outcome.quality.line(), &tell);
+    }
+    let moved = finished.summary.first_motion_s.is_some();
+    match finished.judge(driven)? {
+        End::Time if !moved => Err(not_moved(options)),
+        End::Time | End::Asked => Ok(()),
+    }
+}
+
+/// Brings everything up, activates, engages, runs.
+fn drive(options: &Demo, started: &mut Started, tell: &Tell) -> Result<End> {
+    let run: &mut Run = &mut started.run;
+    let framed = run.wait(started.frame_wait, started.framed)?;
+    if run.asked() {
+        return Ok(End::Asked);
+    }
+    if !framed {
+        return Err(Failure::new(
+            format!(
+                "the virtual glove sent no frame in {} s",
+                started.frame_wait.as_secs()
+            ),
+            "the same on a machine with less to do",
+        )
+        .into());
+    }
+    if !run.calibrate(tell)? || !run.activate(tell)? {
+        return Ok(End::Asked);
+    }
+    tell.say(format_args!(
+        "engaged    the gripper follows the hand for {} (Ctrl-C holds it and ends)",
+        seconds(options.seconds)
+    ));
+    run.drive(&Options {
+        title: match options.on_chip {
+            true => "gauntlet demo --on-chip",
+            false => "gauntlet demo",
+        },
+        seconds: Some(options.seconds),
+        engage: true,
+        drives: true,
+        quiet: options.json,
+    })
+}
+
+/// What the demo says at its end.
+fn say(finished: &Finished, map: &str, tell: &Tell) {
+    finished.tell(tell, "summary    ");
+    if let Some(first) = finished.summary.first_motion_s {
+        tell.say(format_args!(
+            "motion     the gripper first moved with the hand {first:.1} s after the clutch was closed"
+        ));
+    }
+    if finished.ending.is_some() {
+        tell.say(format_args!("map        {map}"));
+    }
+}
+
+/// A demo in which the gripper did not move has failed, whatever was printed.
+fn not_moved(options: &Demo) -> anyhow::Error {
+    let next = match options.on_chip {
+        true => {
+            "the same on a machine with less to do, without --json, whose lines say what held it"
+        }
+        false => "--log FILE.mcap, whose events say what held it",
+    };
+    Failure::new("the gripper did not move with the hand", next).into()
+}

@@ -1,0 +1,89 @@
+//! The demo with the bridge's ARM firmware in QEMU between the virtual devices.
+
+use std::time::Duration;
+
+use anyhow::Result;
+use rig::pty::Handle;
+
+use super::args::Demo;
+use super::parts::{self, Started};
+use crate::commands::{bridge, flash};
+use crate::tell::Tell;
+use host::chip::emulator::{Emulator, Setup, find_firmware};
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::lines::Model;
+use host::next::Command;
+use host::session::Devices;
+use host::training::model;
+use host::training::motion::Motion;
+
+/// Whether there can be such a demo.
+///
+/// # Errors
+/// A failure of usage: the firmware is for another gripper.
+pub(super) fn check(options: &Demo) -> Result<()> {
+    let model = options.gripper_model;
+    if model == Model::ThreeFinger {
+        return Ok(());
+    }
+    Err(Failure::usage(
+        format!(
+            "--on-chip: the firmware is built for the 3-Finger gripper, not for the {}",
+            model.name()
+        ),
+        Command::gauntlet("demo").option("--gripper-model", model.option()),
+    )
+    .into())
+}
+
+/// Starts the devices and the emulated chip, trains, and flashes the map.
+///
+/// # Errors
+/// A failure that says which of its steps did not succeed.
+pub(super) fn start(
+    options: &Demo,
+    motion: &Motion,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<Started> {
+    // What is missing is said before the training, not after it.
+    let firmware = find_firmware(options.firmware.as_deref())?;
+    tell.say(format_args!(
+        "gauntlet demo: glove and gripper are virtual, the bridge is its ARM firmware in QEMU"
+    ));
+    tell.say(format_args!("motion     {}", motion.describe()));
+    let devices = parts::virtual_devices(motion, options.gripper_model)?;
+    let mut emulator = Emulator::new(Setup {
+        firmware,
+        glove: Some(devices[0].path().to_owned()),
+        gripper: Some(devices[1].path().to_owned()),
+        debugger: false,
+    })?;
+    let outcome = parts::trained(options, motion, tell, interrupt)?;
+    let image = model::image(&outcome.model)?;
+    let mut link = emulator.link_unless(interrupt)?;
+    tell_parts(&devices, &emulator, tell);
+    let flashed = flash::flash(&mut link, &image, tell, interrupt)?;
+    Ok(Started {
+        // The emulated chip is gone when somebody could look at it.
+        run: bridge::start(link, None, Devices::Unknown, interrupt)?,
+        outcome,
+        flashed: Some(flashed),
+        home: Box::new((emulator, devices)),
+        framed: |seen| seen.glove_answers,
+        frame_wait: Duration::from_secs(20),
+    })
+}
+
+fn tell_parts(devices: &[Handle; 2], emulator: &Emulator, tell: &Tell) {
+    tell.say(format_args!(
+        "devices    virtual glove on {}, virtual gripper on {}",
+        devices[0].path().display(),
+        devices[1].path().display()
+    ));
+    tell.say(format_args!(
+        "bridge     Cortex-M4F (mps2-an386), host protocol on {}",
+        emulator.address()
+    ));
+}

@@ -1,0 +1,150 @@
+//! What both homes of the demo's bridge share: the trained map, the virtual devices, what was started.
+
+use std::any::Any;
+use std::time::Duration;
+
+use anyhow::Result;
+use rig::Device;
+use rig::glove::VirtualGlove;
+use rig::gripper::VirtualGripper;
+use rig::pty::{Handle, PtyDevice};
+use trainer::algorithm::Schedule;
+use trainer::hand::Space;
+
+use super::args::Demo;
+use crate::commands::simulate;
+use crate::played;
+use crate::progress::Person;
+use crate::run::Run;
+use crate::tell::Tell;
+use host::chip::link::Flashed;
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::lines::Model;
+use host::lines::port::BAUD;
+use host::next::Command;
+use host::realtime;
+use host::session::Snapshot;
+use host::stats::seconds;
+use host::training::motion::Motion;
+use host::training::quality::Quality;
+use host::training::{Outcome, Request, train};
+
+/// Reference pairs chosen one after another.
+const PAIRS: usize = 8;
+
+/// A bridge that runs between virtual devices.
+pub(super) struct Started {
+    pub(super) run: Run,
+    /// The training before it.
+    pub(super) outcome: Outcome,
+    /// How the map came into a chip.
+    pub(super) flashed: Option<Flashed>,
+    /// Devices and emulator: gone when this is dropped.
+    pub(super) home: Box<dyn Any>,
+    /// Whether frames come, and how long they are waited for: virtual sensors boot in 650 ms and are brought up within a few
+    /// seconds.
+    pub(super) framed: fn(&Snapshot) -> bool,
+    pub(super) frame_wait: Duration,
+}
+
+pub(super) fn trained(
+    options: &Demo,
+    motion: &Motion,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<Outcome> {
+    let request = Request {
+        motion,
+        space: Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
+        schedule: Schedule::Fast,
+        epochs: None,
+        pairs: PAIRS,
+        start_pairs: !options.no_start_pairs,
+        seed: options.seed,
+        reporter: &Person,
+    };
+    tell.say(format_args!(
+        "training   {} and {PAIRS} chosen where they help most; a scripted operator shows the hand poses;",
+        if options.no_start_pairs { "no start pairs" } else { "2 start pairs (open hand, fist)" }
+    ));
+    let paper = match &options.poses {
+        Some(poses) => Command::gauntlet("train").path("--poses", poses),
+        None => Command::gauntlet("train").option("--poses", "FILE.csv"),
+    };
+    let paper = paper
+        .option("--schedule", "paper")
+        .option("--out", "model.safetensors");
+    tell.say(format_args!(
+        "           fast schedule, {} epochs (the paper's is 8,000 + 100 a pair: `{paper}`)",
+        request.total_epochs()
+    ));
+    let outcome = train(&request, interrupt)?;
+    tell.say(format_args!("trained    in {}", seconds(outcome.took)));
+    tell.say(format_args!("quality    {}", outcome.quality.line()));
+    require_good(&outcome.quality)?;
+    Ok(outcome)
+}
+
+/// The demo does not drive with a map that leaves out much of the gripper's range, or folds.
+fn require_good(quality: &Quality) -> Result<()> {
+    let Some(fault) = quality.fault() else {
+        return Ok(());
+    };
+    let next = "another --seed, or a recording in which every finger moves over its whole range, alone and together";
+    Err(Failure::new(fault, next).into())
+}
+
+/// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
+pub(super) fn virtual_devices(motion: &Motion, model: Model) -> Result<[Handle; 2]> {
+    let glove = VirtualGlove::new(
+        played::virtual_hand(motion),
+        rig::glove::Config::at_baud(BAUD),
+    );
+    let glove = spawn("glove", Box::new(glove))?;
+    let gripper = VirtualGripper::new(rig::gripper::Config::of(simulate::family(model)));
+    let gripper = spawn("gripper", Box::new(gripper))?;
+    Ok([glove, gripper])
+}
+
+fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
+    realtime::starting(|| PtyDevice::spawn(device, None))
+        .and_then(|(handle, _)| handle)
+        .or_fail(
+            || format!("the virtual {name} gets no pseudo-terminal"),
+            "ending programs that hold many of them (`ls /dev/pts`)",
+        )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn quality(volume_occupancy: f64, d_knn: f64) -> Quality {
+        Quality {
+            mean_distortion: 6.0,
+            volume_occupancy,
+            d_knn,
+            frames: 254,
+            measured_on: "held-out frames".to_owned(),
+            bar: host::training::quality::Bar::of(Space::ThreeFinger),
+        }
+    }
+
+    #[test]
+    fn a_map_below_the_gate_is_refused_with_both_measures() {
+        assert!(require_good(&quality(0.90, 16.0)).is_ok());
+        for (occupancy, d_knn) in [
+            (0.899, 5.0),
+            (0.99, 16.01),
+            (f64::NAN, 5.0),
+            (0.99, f64::NAN),
+        ] {
+            let error = require_good(&quality(occupancy, d_knn)).unwrap_err();
+            assert!(
+                error.to_string().contains(&format!("{d_knn:.2}")),
+                "{error}"
+            );
+        }
+    }
+}

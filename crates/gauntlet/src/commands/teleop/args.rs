@@ -1,0 +1,67 @@
+//! The options of `teleop`.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::{Args, ValueEnum};
+
+use crate::options::{LineOptions, model_parser, run_time};
+use host::lines::Model;
+
+/// Which hand wears the glove.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Hand {
+    /// The right hand.
+    Right,
+    /// The left hand.
+    Left,
+}
+
+/// Options of `teleop`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
+
+Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
+`--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \
+by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
+pub struct Teleop {
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT")]
+    pub glove: PathBuf,
+    /// The gripper's serial port, or `tcp:HOST[:PORT]`.
+    #[arg(long, value_name = "PORT")]
+    pub gripper: PathBuf,
+    /// The trained model, or a weights image.
+    #[arg(long, value_name = "MODEL|IMAGE")]
+    pub model: PathBuf,
+    /// End by itself after this many seconds (1 to 86400).
+    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
+    pub seconds: Option<Duration>,
+    /// Close the clutch from the start: the gripper follows as soon as everything is ready.
+    #[arg(long)]
+    pub engage: bool,
+    /// Activate the gripper if it is not: the fingers move.
+    #[arg(long)]
+    pub activate: bool,
+    /// Which hand wears the glove.
+    #[arg(long, value_enum, default_value_t = Hand::Right)]
+    pub hand: Hand,
+    /// Calibrate on the flat hand before the clutch may close: waits up to 30 s until it lies still for a second.
+    #[arg(long)]
+    pub calibrate_flat: bool,
+    /// How the gripper's line differs from that of a gripper as delivered.
+    #[command(flatten)]
+    pub line: LineOptions,
+    /// Which gripper it is; the map gives as many positions as it has axes.
+    #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
+    pub gripper_model: Model,
+    /// Write every frame, command and status into this session log.
+    #[arg(long, value_name = "FILE.mcap")]
+    pub log: Option<PathBuf>,
+    /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}

@@ -1,0 +1,124 @@
+//! What comes before the clutch may close: frames, the calibration, the gripper's activation.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Result;
+use glove::hand::SEGMENT_COUNT;
+use glove::scan::Health;
+use gripper::Activation;
+
+use super::args::Teleop;
+use crate::run::Run;
+use crate::tell::Tell;
+use host::diagnose;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::next::{Command, NextStep};
+use host::session::Snapshot;
+use host::words;
+
+/// Bring-up of 16 sensors: a reset of 650 ms, two mode changes each, and time to spare.
+const FRAME_WAIT: Duration = Duration::from_secs(15);
+/// For the others after the first that gives orientations.
+const STRAGGLERS: Duration = Duration::from_secs(2);
+
+/// How the bring-up ended.
+pub(super) enum Prepared {
+    /// The clutch may close.
+    Ready,
+    /// Somebody asked for the end.
+    Ended,
+    /// No sensor of the glove gave an orientation.
+    NoFrames,
+}
+
+impl From<bool> for Prepared {
+    fn from(go_on: bool) -> Self {
+        if go_on { Self::Ready } else { Self::Ended }
+    }
+}
+
+/// Everything before the clutch may close.
+pub(super) fn prepare(
+    options: &Teleop,
+    run: &mut Run,
+    tell: &Tell,
+    activation: Activation,
+) -> Result<Prepared> {
+    tell.say(format_args!(
+        "glove    {}  answers, bringing up its 16 sensors",
+        options.glove.display()
+    ));
+    let framed = run.wait(FRAME_WAIT, |s| s.frame_sequence > 0)?;
+    if run.asked() {
+        return Ok(Prepared::Ended);
+    }
+    if !framed {
+        return Ok(Prepared::NoFrames);
+    }
+    tell_missing(run, tell)?;
+    if options.calibrate_flat && !run.calibrate(tell)? {
+        return Ok(Prepared::Ended);
+    }
+    if activation == Activation::Ready {
+        return Ok(Prepared::Ready);
+    }
+    if options.activate
+        || run.ask_yes(
+            "The gripper is not activated. Activation moves its fingers. Type yes to activate it: ",
+        )?
+    {
+        return run.activate(tell).map(Prepared::from);
+    }
+    if run.asked() {
+        return Ok(Prepared::Ended);
+    }
+    if options.engage {
+        return Err(Failure::new(
+            format!(
+                "the gripper on {} is {}, so it cannot follow",
+                options.gripper.display(),
+                words::activation(activation)
+            ),
+            NextStep::same(Command::more().word("--activate")).then(": the fingers will move"),
+        )
+        .into());
+    }
+    tell.say(format_args!(
+        "not activated: you can watch the hand, the gripper will not move"
+    ));
+    Ok(Prepared::Ready)
+}
+
+/// Names the sensors that did not come up, as `doctor` does: their joints are held.
+fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
+    let all = |health: &[Health; SEGMENT_COUNT]| health.iter().all(|health| health.is_good());
+    let health = |seen: &Snapshot| seen.frame.map(|frame| frame.samples.map(|s| s.health));
+    run.wait(STRAGGLERS, |seen| health(seen).is_some_and(|h| all(&h)))?;
+    // One that is still being brought up says soon what it fails with.
+    run.wait(2 * STRAGGLERS, |seen| {
+        health(seen).is_some_and(|h| !h.contains(&Health::Starting))
+    })?;
+    let seen = run.snapshot();
+    let Some(health) = seen.as_ref().and_then(health).filter(|health| !all(health)) else {
+        return Ok(());
+    };
+    for finding in diagnose::missing_sensors(&health).0 {
+        tell.say(format_args!("warning: {}", finding.what));
+        if let Some(next) = finding.next {
+            tell.say(format_args!("  try: {next}"));
+        }
+    }
+    Ok(())
+}
+
+/// Why no frame came, once the glove's port is free.
+pub(super) fn no_frames(path: &Path, interrupt: &Interrupt) -> anyhow::Error {
+    let what = format!(
+        "the glove's serial multiplexer on {} answers, but no sensor sent an orientation in {} s",
+        path.display(),
+        FRAME_WAIT.as_secs()
+    );
+    diagnose::no_sensors(&what, path, interrupt).into()
+}

@@ -1,0 +1,89 @@
+//! Options that several verbs have.
+
+use std::path::Path;
+use std::time::Duration;
+
+use clap::Args;
+use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+
+use host::failure::Failure;
+use host::lines::{Model, Settings};
+
+/// How a gripper's line differs from that of a gripper as delivered.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct LineOptions {
+    /// The gripper's Modbus unit (slave id), if not 9 on a serial line (1 to 247) or 2 over TCP (0 to 255).
+    #[arg(long, value_name = "N")]
+    pub unit: Option<u8>,
+    /// Speed of the gripper's serial line, if not 115200.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
+    pub baud: Option<u32>,
+    /// Wait so much longer for the gripper's answers, milliseconds (1 to 1000): for a serial tunnel or a slow network.
+    #[arg(long, value_name = "MS", value_parser = host::lines::patience)]
+    pub patience: Option<Duration>,
+}
+
+impl LineOptions {
+    /// The same for a line, if it fits `path`.
+    ///
+    /// # Errors
+    /// A failure of usage: a speed for a line that has none.
+    pub fn settings(&self, path: &Path) -> Result<Settings, Failure> {
+        let settings = Settings {
+            unit: self.unit,
+            baud: self.baud,
+            patience: self.patience,
+        };
+        settings.check(path)?;
+        Ok(settings)
+    }
+}
+
+/// The command line as it was typed, the program by its name.
+pub fn typed() -> Vec<String> {
+    let words = std::env::args_os().skip(1);
+    let words = words.map(|word| word.to_string_lossy().into_owned());
+    std::iter::once("gauntlet".to_owned())
+        .chain(words)
+        .collect()
+}
+
+/// Takes a gripper's name on the command line.
+pub fn model_parser() -> impl TypedValueParser<Value = Model> {
+    let names = Model::ALL.map(|model| {
+        let help = match model {
+            Model::ThreeFinger => "3-Finger Adaptive Gripper",
+            Model::TwoFinger85 | Model::TwoFinger140 | Model::HandE => model.name(),
+        };
+        PossibleValue::new(model.option()).help(help)
+    });
+    PossibleValuesParser::new(names).try_map(|name: String| name.parse::<Model>())
+}
+
+/// Whole or broken seconds from 1 to a day.
+///
+/// # Errors
+/// What is wrong with the text.
+pub fn run_time(text: &str) -> Result<Duration, String> {
+    let seconds: f64 = text
+        .parse()
+        .map_err(|_| format!("{text} is not a number of seconds"))?;
+    if (1.0..=86_400.0).contains(&seconds) {
+        Ok(Duration::from_secs_f64(seconds))
+    } else {
+        Err(format!("{text} is not between 1 and 86400 seconds"))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_out_of_range_are_refused() {
+        for text in ["0", "-1", "nan", "inf", "1e9", "soon"] {
+            assert!(run_time(text).is_err(), "{text}");
+        }
+        assert_eq!(run_time("2.5"), Ok(Duration::from_millis(2500)));
+    }
+}

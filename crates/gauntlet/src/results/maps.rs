@@ -1,0 +1,94 @@
+//! Results of verbs that make, measure and store maps.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use serde::Serialize;
+
+use host::chip::link::Flashed;
+use host::next::NextStep;
+use host::training::model::Int16;
+use host::training::quality::{Measured, Quality};
+
+/// How good a map is.
+#[derive(Debug, Serialize)]
+#[serde(untagged)]
+pub enum Measures<'a> {
+    /// One of a hand.
+    Hand(&'a Quality),
+    /// One between any two domains.
+    Domains(&'a Measured),
+}
+
+/// `train` to its end.
+#[derive(Debug, Serialize)]
+pub struct Trained<'a> {
+    /// The model's file.
+    pub model: &'a Path,
+    /// Epochs of the training.
+    pub epochs: usize,
+    /// Reference pairs.
+    pub pairs: usize,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// How long the training took, s.
+    pub training_s: f64,
+    /// What a person should know.
+    pub warnings: &'a [String],
+    /// How good the map is.
+    pub quality: Measures<'a>,
+    /// Whether a hand's map is worth driving with; `null` for other domains.
+    pub good: Option<bool>,
+}
+
+/// `train` stopped on the way (`--stop-at`).
+#[derive(Debug, Serialize)]
+pub struct Paused<'a> {
+    /// There is none yet: `null`.
+    pub model: Option<&'a Path>,
+    /// The epoch it was stopped at.
+    pub stopped_at_epoch: usize,
+    /// Where the state is.
+    pub checkpoint: &'a Path,
+    /// How it goes on.
+    #[serde(flatten)]
+    pub next: NextStep,
+}
+
+/// `eval`.
+#[derive(Debug, Serialize)]
+pub struct Evaluated<'a> {
+    /// The model's file.
+    pub model: &'a Path,
+    /// What the file says of itself.
+    pub metadata: &'a BTreeMap<String, String>,
+    /// Whether the samples did not train it; `null` where the file does not say.
+    pub held_out: Option<bool>,
+    /// How good the map is.
+    pub quality: Measures<'a>,
+    /// Whether a hand's map is worth driving with; `null` for other domains.
+    pub good: Option<bool>,
+}
+
+/// `export`.
+#[derive(Debug, Serialize)]
+pub struct Exported<'a> {
+    /// The image's file.
+    pub image: &'a Path,
+    /// Its length.
+    pub bytes: usize,
+    /// Another image stood there.
+    pub replaced: bool,
+    /// What the integers cost; `null` for an image in f32.
+    pub int16: Option<&'a Int16>,
+}
+
+/// `flash`.
+#[derive(Debug, Serialize)]
+pub struct Stored<'a> {
+    /// The image that arrived.
+    #[serde(flatten)]
+    pub flashed: &'a Flashed,
+    /// What the integers cost; `null` for an image in f32.
+    pub int16: Option<&'a Int16>,
+}

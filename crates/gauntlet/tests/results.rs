@@ -1,0 +1,468 @@
+//! The names in what `--json` prints: a filled sample of every result against a file, and against docs/json.md.
+//! `GAUNTLET_GOLDEN=write` writes the files anew.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use bridge::State;
+use bridge::calibration::{CalibrationState, Try};
+use bridge::clutch::Position;
+use bridge::protocol::message::{
+    Counters, GripperStatus, Health, Hello, PerAxis, Restart, SlotContents, Slots, Status,
+    WeightsKind,
+};
+use gauntlet::results::{devices, maps, named, paper, runs};
+use gripper::{Activation, Fault};
+use host::chip::link::Flashed;
+use host::diagnose::{Finding, Findings, Verdict};
+use host::failure::{Failure, Told};
+use host::lines::list::Listed;
+use host::next::{Command, advice};
+use host::recording::Written;
+use host::session::{Stopped, Summary};
+use host::training::model::Int16;
+use host::training::quality::{Bar, Measured, Quality};
+use serde::Serialize;
+use trainer::hand::Space;
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
+}
+
+/// One file of the folder: the samples in it stand one after another.
+fn golden(file: &str, samples: &[serde_json::Value]) {
+    let text = serde_json::to_string_pretty(samples).unwrap() + "\n";
+    let path = folder().join(file);
+    if std::env::var("GAUNTLET_GOLDEN").is_ok_and(|word| word == "write") {
+        std::fs::create_dir_all(folder()).unwrap();
+        std::fs::write(&path, &text).unwrap();
+    }
+    let kept = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        kept == text,
+        "{} holds other names: a name that goes or changes is a new version of that result (results::VERSION, docs/json.md); \
+         then GAUNTLET_GOLDEN=write. Now:\n{text}",
+        path.display()
+    );
+}
+
+fn sample(verb: &'static str, value: impl Serialize) -> serde_json::Value {
+    serde_json::to_value(named(verb, value)).unwrap()
+}
+
+fn path(text: &str) -> &Path {
+    Path::new(text)
+}
+
+fn quality() -> Quality {
+    Quality {
+        mean_distortion: 6.0,
+        volume_occupancy: 0.97,
+        d_knn: 5.5,
+        frames: 254,
+        measured_on: "held-out frames".to_owned(),
+        bar: Bar::of(Space::ThreeFinger),
+    }
+}
+
+fn measured() -> Measured {
+    Measured {
+        mean_distortion: 1.5,
+        volume_occupancy: None,
+        d_knn: f64::NAN,
+        nmse: Some(0.02),
+        unknown: vec!["no volume occupancy"],
+        samples: 476,
+        true_pairs: 476,
+        measured_on: "held-out rows".to_owned(),
+    }
+}
+
+fn int16() -> Int16 {
+    Int16 {
+        error_counts: vec![0.25],
+        error_of_range: 0.001,
+    }
+}
+
+fn slots() -> Slots {
+    let image = SlotContents::Image {
+        model_id: 1,
+        version: 2,
+        length: 600,
+        crc: 3,
+        weights: WeightsKind::Float32,
+    };
+    Slots {
+        active: Some(1),
+        contents: [SlotContents::Empty, image],
+    }
+}
+
+fn flashed() -> Flashed {
+    Flashed {
+        slot: 1,
+        bytes: 600,
+        crc: 3,
+        resumed_at: 0,
+        broken_lines: 0,
+        repeats: 0,
+        slots: slots(),
+    }
+}
+
+fn status() -> Status {
+    let mut axes = PerAxis::new();
+    axes.push(120).unwrap();
+    Status {
+        now_us: 1_000_000,
+        state: State::Following,
+        engaged: true,
+        heartbeat: true,
+        glove_answers: true,
+        gripper: Some(GripperStatus {
+            activation: Activation::Ready,
+            fault: Fault::None,
+            echo: axes.clone(),
+            position: axes,
+        }),
+        active_slot: Some(1),
+        transfer: Some((1, 2)),
+    }
+}
+
+fn health() -> Health {
+    Health {
+        clutch: Position::Closed,
+        calibration: CalibrationState {
+            is_calibrated: true,
+            newest: Try::Taken,
+            ended: 1,
+        },
+        restart: Restart::Power,
+        stalls: 0,
+    }
+}
+
+fn summary() -> Summary {
+    Summary {
+        seconds: 20.0,
+        bytes_lost: Some([0; 3]),
+        ..Summary::default().with(
+            &bridge::telemetry::Counters::default(),
+            host::realtime::Scheduling::Shared,
+        )
+    }
+}
+
+fn log() -> Written {
+    Written {
+        path: "run.mcap".into(),
+        messages: 7,
+        covers: Duration::from_secs(20),
+        lost: 0,
+        fault: None,
+    }
+}
+
+#[test]
+fn results_of_runs_keep_their_names() {
+    let (summary, log, quality, flashed) = (summary(), log(), quality(), flashed());
+    let run = || runs::Run {
+        gripper: Some(Stopped::Held),
+        run: &summary,
+        log: Some(&log),
+        poses: Some(runs::Poses {
+            path: path("hand.csv"),
+            rows: 400,
+        }),
+    };
+    let demo = runs::Demo {
+        motion: "generated".to_owned(),
+        training_s: 3.0,
+        epochs: 1_000,
+        pairs: 10,
+        quality: &quality,
+        flash: Some(&flashed),
+        run: run(),
+    };
+    golden(
+        "runs.json",
+        &[sample("teleop", run()), sample("demo", demo)],
+    );
+}
+
+#[test]
+fn results_of_maps_keep_their_names() {
+    let (quality, measured, int16, flashed) = (quality(), measured(), int16(), flashed());
+    let metadata = BTreeMap::from([("cost".to_owned(), "hae".to_owned())]);
+    let warnings = ["a column is constant".to_owned()];
+    let trained = maps::Trained {
+        model: path("model.safetensors"),
+        epochs: 1_000,
+        pairs: 10,
+        seed: 1,
+        training_s: 3.0,
+        warnings: &warnings,
+        quality: maps::Measures::Hand(&quality),
+        good: Some(true),
+    };
+    let paused = maps::Paused {
+        model: None,
+        stopped_at_epoch: 100,
+        checkpoint: path("half.checkpoint"),
+        next: Command::gauntlet("train").into(),
+    };
+    let evaluated = maps::Evaluated {
+        model: path("map.safetensors"),
+        metadata: &metadata,
+        held_out: Some(true),
+        quality: maps::Measures::Domains(&measured),
+        good: None,
+    };
+    let exported = maps::Exported {
+        image: path("weights.hae"),
+        bytes: 600,
+        replaced: false,
+        int16: Some(&int16),
+    };
+    let stored = maps::Stored {
+        flashed: &flashed,
+        int16: None,
+    };
+    golden(
+        "maps.json",
+        &[
+            sample("train", trained),
+            sample("train", paused),
+            sample("eval", evaluated),
+            sample("export", exported),
+            sample("flash", stored),
+        ],
+    );
+}
+
+#[test]
+fn results_of_devices_keep_their_names() {
+    let at = |verb: &str| Command::gauntlet(verb).option("--gripper", "/dev/ttyUSB1");
+    let ports = [Listed {
+        path: "/dev/ttyUSB1".into(),
+        kind: "usb",
+        vendor_id: Some("0403".to_owned()),
+        product_id: Some("6001".to_owned()),
+        product: Some("FT232R".to_owned()),
+        manufacturer: Some("FTDI".to_owned()),
+        serial_number: Some("A".to_owned()),
+        stable_path: Some("/dev/serial/by-id/usb-FTDI_A".into()),
+        latency_timer_ms: Some(16),
+        warnings: vec!["its latency timer is 16 ms".to_owned()],
+    }];
+    let finding = |verdict, next| Finding {
+        layer: "line",
+        verdict,
+        what: "no byte comes".to_owned(),
+        next,
+    };
+    let next = advice("the 24 V supply; then ").then(at("doctor"));
+    let examined = [devices::Examined {
+        device: "gripper",
+        place: "/dev/ttyUSB1".to_owned(),
+        findings: Findings(vec![
+            finding(Verdict::Good, None),
+            finding(Verdict::Wrong, Some(next)),
+        ]),
+    }];
+    let doctor = devices::Doctor {
+        devices: &examined,
+        wrong: 1,
+        ports: Some(&ports),
+    };
+    let fault = Fault::Released;
+    let gripper = devices::Gripper {
+        place: "/dev/ttyUSB1".to_owned(),
+        gripper_model: "3f",
+        activation: "ready",
+        going_to: true,
+        mode: Some("basic".to_owned()),
+        motion: Some("the fingers move".to_owned()),
+        controller: None,
+        fault: Some(devices::Fault {
+            code: format!("{:02X}", fault.code()),
+            meaning: fault.sentence(),
+            next: host::diagnose::cure(fault, at),
+        }),
+        axes: vec![devices::Axis {
+            name: "finger A",
+            position: 100,
+            asked: Some(120),
+            current_ma: 10,
+            state: "moving",
+        }],
+        raw: Some("F9".to_owned()),
+    };
+    let silent = devices::NoAnswer {
+        error: "no answer in time".to_owned(),
+        next: at("doctor").into(),
+    };
+    golden(
+        "devices.json",
+        &[
+            sample("ports", devices::Ports { ports: &ports }),
+            sample("doctor", doctor),
+            sample("gripper status", gripper),
+            sample("gripper watch", silent),
+        ],
+    );
+}
+
+#[test]
+fn results_of_bridges_keep_their_names() {
+    let (status, slots, health) = (status(), slots(), health());
+    let hello = Hello {
+        version: 3,
+        shape: [25, 300, 4],
+        joint_order: 1,
+        capacity: 100_000,
+        chunk: 512,
+    };
+    let counters = Counters::default();
+    let bridge = devices::Bridge {
+        hello: Some(&hello),
+        status: &status,
+        slots: &slots,
+        counters: &counters,
+        health: Some(&health),
+    };
+    golden(
+        "bridge.json",
+        &[
+            sample("bridge status", bridge),
+            sample("bridge release", devices::Released { status: &status }),
+            sample("bridge calibrate", devices::Calibrated { health: &health }),
+            sample("bridge select", devices::Selected { slots: &slots }),
+            sample("bridge reboot", devices::Rebooted { restarting: true }),
+        ],
+    );
+}
+
+#[test]
+fn results_of_the_paper_keep_their_names() {
+    let measure = paper::Measure {
+        measure: "VO",
+        ours: Some(paper::Ours {
+            repetitions: 10,
+            mean: 0.9,
+            median: 0.91,
+            deviation: Some(0.01),
+            quartiles: [0.89, 0.92],
+        }),
+        paper: Some(paper::Papers {
+            mean: 0.95,
+            deviation: None,
+        }),
+        range: Some([Some(0.9), None]),
+        outside: false,
+    };
+    let data = paper::Data {
+        data: "sp1".to_owned(),
+        rows: vec![paper::Row {
+            cost: "HAE",
+            measures: vec![measure],
+        }],
+        orders: vec![paper::Order {
+            what: "HAE is best".to_owned(),
+            holds: true,
+        }],
+        t_tests: vec![
+            Some(paper::Test {
+                t: 2.0,
+                degrees_of_freedom: 9,
+                p: 0.07,
+            }),
+            None,
+        ],
+    };
+    let shape = paper::Shape {
+        data: "sp1".to_owned(),
+        nodes: 476,
+        matched: 40,
+        volume: 9.0,
+        dim: 2,
+    };
+    let fold = paper::Fold {
+        wanted: "fold",
+        found: true,
+        data: "sp1".to_owned(),
+        cost: "hae".to_owned(),
+        seed: 3,
+        flipped_share: 0.2,
+        d_knn: 30.0,
+    };
+    let pair = paper::Pair {
+        target: vec![0.0, 255.0, 0.0, 137.0],
+        like: "basic open",
+    };
+    let made = |what: &str, result| paper::Made {
+        what: what.to_owned(),
+        files: vec![format!("reproduction/{what}.csv")],
+        result,
+    };
+    let reproduced = paper::Reproduced {
+        folder: path("reproduction"),
+        seeds: 10,
+        took_s: 3600.0,
+        results: vec![
+            made("table2", Some(paper::Numbers::Tables(vec![data]))),
+            made("fig1", Some(paper::Numbers::Shapes(vec![shape]))),
+            made("fig6", Some(paper::Numbers::Folds(vec![fold]))),
+            made("fig9", Some(paper::Numbers::Pairs(vec![pair]))),
+            made("fig2", None),
+        ],
+    };
+    golden("paper.json", &[sample("reproduce", reproduced)]);
+}
+
+#[test]
+fn a_failure_keeps_its_names() {
+    let next = advice("the cable; then ").then(Command::gauntlet("ports"));
+    let failure = Failure::new("the port /dev/ttyUSB1 is not there", next);
+    let error = host::failure::with_others(failure.into(), vec!["the log".to_owned()]);
+    golden("failure.json", &[sample("failure", Told::of(&error))]);
+}
+
+/// Names that are free: what a model's file says of itself.
+const FREE: [&str; 1] = ["metadata"];
+
+fn names(value: &serde_json::Value, all: &mut BTreeSet<String>) {
+    match value {
+        serde_json::Value::Array(values) => values.iter().for_each(|value| names(value, all)),
+        serde_json::Value::Object(fields) => {
+            for (name, value) in fields {
+                all.insert(name.clone());
+                if !FREE.contains(&name.as_str()) {
+                    names(value, all);
+                }
+            }
+        }
+        _ => {}
+    }
+}
+
+#[test]
+fn every_name_is_on_the_page() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/json.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let mut all = BTreeSet::new();
+    for entry in std::fs::read_dir(folder()).unwrap() {
+        let text = std::fs::read_to_string(entry.unwrap().path()).unwrap();
+        names(&serde_json::from_str(&text).unwrap(), &mut all);
+    }
+    assert!(all.len() > 100, "{}", all.len());
+    let missing: Vec<_> = all
+        .iter()
+        .filter(|name| !page.contains(&format!("`{name}`")))
+        .collect();
+    assert!(missing.is_empty(), "not in docs/json.md: {missing:?}");
+}
