@@ -5,6 +5,7 @@
 mod support;
 
 use std::path::{Path, PathBuf};
+use std::process::Output;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -14,7 +15,7 @@ use rig::glove::VirtualGlove;
 use rig::gripper::{Config, Family, VirtualGripper, tcp};
 use serde_json::Value;
 use support::bench::{BRINGUP, hand};
-use support::{devices, finish, json, refusal, run, start, text};
+use support::{devices, finish, json, kept_waiting, refusal, run, start, text};
 
 /// A map of one output: the proximal flexion of the index finger, 1 rad from open to closed.
 fn one_output(folder: &Path) -> PathBuf {
@@ -43,8 +44,27 @@ fn one_output(folder: &Path) -> PathBuf {
     path
 }
 
+/// Times that a run is tried on a computer that has no time for it.
+const ATTEMPTS: u32 = 4;
+
 /// Drives `gripper` at `place` for some seconds with a hand that bends and stretches; what the run says of itself.
 fn driven(gripper: &VirtualGripper, place: &str, options: &[&str]) -> Value {
+    for _ in 1..ATTEMPTS {
+        let output = ran(gripper, place, options);
+        if !kept_waiting(&output) {
+            return json(&output);
+        }
+        println!("{}", text(&output.stderr));
+        // A log is never written over.
+        if let Some(pair) = options.windows(2).find(|pair| pair[0] == "--log") {
+            let _ = std::fs::remove_file(pair[1]);
+        }
+    }
+    json(&ran(gripper, place, options))
+}
+
+fn ran(gripper: &VirtualGripper, place: &str, options: &[&str]) -> Output {
+    let written = gripper.writes();
     let moves = Arc::new(AtomicBool::new(false));
     let config = rig::glove::Config::at_baud(115_200);
     let glove = VirtualGlove::new(Box::new(hand(Arc::clone(&moves))), config);
@@ -60,13 +80,16 @@ fn driven(gripper: &VirtualGripper, place: &str, options: &[&str]) -> Value {
     ];
     let mut child = start(&[&words[..], &more, options].concat());
     let end = Instant::now() + BRINGUP;
-    while gripper.writes() < 10 {
-        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+    while gripper.writes() < written + 10 {
+        if child.try_wait().unwrap().is_some() {
+            // It says why.
+            return finish(child);
+        }
         assert!(Instant::now() < end, "nothing was commanded");
         std::thread::sleep(Duration::from_millis(20));
     }
     moves.store(true, Ordering::Relaxed);
-    json(&finish(child))
+    finish(child)
 }
 
 #[test]

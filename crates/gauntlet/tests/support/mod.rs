@@ -88,6 +88,13 @@ pub fn json(output: &Output) -> serde_json::Value {
     serde_json::from_slice(&output.stdout).expect("standard output is JSON and nothing else")
 }
 
+/// Whether a run failed because this computer had no time for it, and says so.
+pub fn kept_waiting(output: &Output) -> bool {
+    let said = text(&output.stderr);
+    let busy = ["a computer with less to do", "nor has so much to do"];
+    output.status.code() == Some(1) && busy.iter().any(|words| said.contains(words))
+}
+
 /// The one line that says what is wrong, after checking its form, the next step and the exit code.
 pub fn refusal(output: &Output, code: i32) -> String {
     let stderr = text(&output.stderr);
