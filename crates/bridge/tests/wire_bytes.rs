@@ -9,7 +9,7 @@ use bridge::gripper::{Activation, Contact, registers::Fault};
 use bridge::hae::image::{self, JointOrder};
 use bridge::protocol::frame;
 use bridge::protocol::message::{
-    Answer, AxisDetail, Call, Configuration, Counters, Devices, FromBridge, GripperDetail,
+    Answer, AxisDetail, CAUSES, Call, Configuration, Counters, Devices, FromBridge, GripperDetail,
     GripperStatus, Health, Hello, Refusal, Replies, Reply, Request, Restart, Sample, SlotContents,
     Slots, Status, UnusedSensor, VERSION, WeightsKind,
 };
@@ -467,6 +467,7 @@ fn devices() -> Vec<Devices> {
     let with = |healths: &[scan::Health], gripper| Devices {
         now_us: 12_345_678_901,
         glove_age_ms: Some(300),
+        missing: 0x4003,
         sensors: (0..)
             .zip(healths)
             .map(|(segment, health)| UnusedSensor {
@@ -498,7 +499,7 @@ fn devices() -> Vec<Devices> {
         Contact::AtPosition,
     ];
     let mut all: Vec<Devices> = healths
-        .chunks(16)
+        .chunks(CAUSES)
         .map(|healths| {
             let axes = contacts.map(|contact| AxisDetail {
                 contact,

@@ -140,7 +140,8 @@ Examples:
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
 ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
 takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
-The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves. \
+The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
+Enter lays it flat at any time, and Enter again lets it move. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.

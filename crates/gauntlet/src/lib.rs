@@ -11,6 +11,7 @@
 
 pub mod cli;
 pub mod commands;
+mod flat_hand;
 pub mod live;
 pub mod out;
 pub mod outputs;

@@ -19,7 +19,7 @@ mod devices;
 mod health;
 
 pub use counters::Counters;
-pub use devices::{AxisDetail, Devices, GripperDetail, Replies, UnusedSensor};
+pub use devices::{AxisDetail, CAUSES, Devices, GripperDetail, Replies, UnusedSensor};
 pub use health::{Health, Restart};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.

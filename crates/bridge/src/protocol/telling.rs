@@ -2,8 +2,8 @@
 
 use super::configuration::per_axis;
 use super::message::{
-    AXES, AxisDetail, Counters, Devices, FromBridge, GripperDetail, GripperStatus, Health, Replies,
-    Sample, Status, UnusedSensor,
+    AXES, AxisDetail, CAUSES, Counters, Devices, FromBridge, GripperDetail, GripperStatus, Health,
+    Replies, Sample, Status, UnusedSensor,
 };
 use super::server::Server;
 use crate::clutch::Position;
@@ -121,6 +121,7 @@ pub(super) fn devices<B: Board<X>, const X: usize>(app: &App<B, X>) -> Devices {
     Devices {
         now_us: seen.now.as_ticks(),
         glove_age_ms: newest.filter(|stamp| stamp.as_ticks() > 0).map(age_ms),
+        missing: seen.frame.map_or(0, |frame| !frame.good()),
         sensors: (0..)
             .zip(samples)
             .filter(|(_, sample)| !sample.health.is_good())
@@ -128,6 +129,7 @@ pub(super) fn devices<B: Board<X>, const X: usize>(app: &App<B, X>) -> Devices {
                 segment,
                 health: sample.health,
             })
+            .take(CAUSES)
             .collect(),
         distrusted: seen.distrusted,
         impossible: seen.impossible,

@@ -1,6 +1,7 @@
 //! `gauntlet simulate`: virtual devices behind pseudo-terminals, or a gripper behind a TCP port, for any program that
 //! speaks to the real ones.
 
+use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -12,6 +13,7 @@ use rig::gripper::{Family, VirtualGripper};
 use rig::pty::{Handle, PtyDevice};
 
 use crate::cli::Simulate;
+use crate::flat_hand::Hand;
 use crate::played;
 use crate::progress::Person;
 use crate::say;
@@ -24,8 +26,8 @@ use host::probe;
 use host::realtime;
 use host::training::motion::Motion;
 
-/// How often the wait for Ctrl-C looks around.
-const WATCH: Duration = Duration::from_secs(3600);
+/// How often the wait for Ctrl-C looks for a line on standard input.
+const WATCH: Duration = Duration::from_millis(100);
 /// How often the sensors are looked at while they boot (650 ms).
 const LOOK: Duration = Duration::from_millis(20);
 /// Where the devices are linked when no path is given.
@@ -62,7 +64,15 @@ pub(super) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     if !interrupt.asked() {
         say!("ready");
     }
-    while !interrupt.sleep(WATCH) {}
+    let mut hand = glove.as_ref().map(|glove| Hand::of(&glove.device));
+    if hand.is_some() && std::io::stdin().is_terminal() {
+        say!("Enter lays the virtual hand flat, to be calibrated; Enter again lets it move");
+    }
+    while !interrupt.sleep(WATCH) {
+        if let Some(hand) = &mut hand {
+            hand.listen();
+        }
+    }
     // Taking the handles down removes the links.
     drop((glove, gripper));
     Ok(())

@@ -12,11 +12,12 @@ use bridge::protocol;
 use bridge::protocol::message::{Counters, Sample, Status};
 
 use super::axes::Axes;
+use super::chip_devices::Known;
 use super::chip_stop::{renew, stop};
 use super::hub::{Happened, Hub, Totals};
 use super::orders::{Order, Queue};
 use super::record::Sort;
-use super::snapshot::{self, Snapshot};
+use super::snapshot::Snapshot;
 use super::stopped::Stopped;
 use crate::chip::link::{Error, Heartbeat, HostLink};
 
@@ -68,6 +69,7 @@ pub(super) struct Worker {
     status: Status,
     asked_status: Instant,
     sample: Option<Sample>,
+    devices: Known,
     calibration: CalibrationState,
     trying: Option<Trying>,
     counted: (Instant, Counters),
@@ -85,7 +87,7 @@ impl Worker {
     ) -> Self {
         let now = Instant::now();
         hub.lock().totals = Totals::on_chip(&counters, now);
-        let worker = Self {
+        let mut worker = Self {
             link,
             orders,
             hub,
@@ -94,6 +96,7 @@ impl Worker {
             touched: false,
             clutch: Position::Open,
             missed: 0,
+            devices: Known::new(&status),
             status,
             asked_status: now,
             sample: None,
@@ -167,9 +170,12 @@ impl Worker {
         }
         if quiet {
             self.count(begun + HEARTBEAT)?;
+            self.look_at_devices(begun + HEARTBEAT)?;
         }
         for sample in self.link.listen(LISTEN)? {
-            self.hub.lock().numbers.sample(&sample);
+            let blocked = |axis| self.devices.is_blocked(axis);
+            self.hub.lock().numbers.sample(&sample, blocked);
+            self.devices.sample(&sample);
             if let Some(samples) = &self.samples {
                 // Who keeps them and is slow, or gone, says so.
                 let _ = samples.try_send(sample.clone());
@@ -293,6 +299,22 @@ impl Worker {
         Ok(())
     }
 
+    /// Four times a second, where the answer comes by `end`.
+    fn look_at_devices(&mut self, end: Instant) -> Result<(), Error> {
+        let before = self.devices.stands();
+        if self.devices.ask(&mut self.link, end)?.is_none() {
+            return Ok(());
+        }
+        let mut said = self.hub.lock();
+        if let Some(line) = self.devices.line() {
+            said.totals.line(&line);
+        }
+        if let Some(axis) = self.devices.stands().filter(|_| before.is_none()) {
+            said.numbers.obeyed.stands(axis);
+        }
+        Ok(())
+    }
+
     fn take_counters(&mut self, counters: Counters) {
         let now = Instant::now();
         let (at, before) = std::mem::replace(&mut self.counted, (now, counters));
@@ -309,42 +331,31 @@ impl Worker {
         said.totals.count(&counters, now);
     }
 
-    fn say(&self) {
+    fn say(&mut self) {
+        self.devices.status(&self.status);
         let status = &self.status;
-        let sample = self.sample.as_ref();
-        let sample = sample.filter(|sample| sample.now_us >= status.now_us);
         let newest = self.sample.as_ref();
-        let now_us = newest.map_or(status.now_us, |sample| sample.now_us.max(status.now_us));
-        let now = gripper::Instant::from_ticks(now_us);
-        let gripper = status.gripper.as_ref().and_then(|gripper| {
-            let position = sample.map_or(&gripper.position, |sample| &sample.position);
-            Some(snapshot::Status {
-                stamp: now,
-                activation: gripper.activation,
-                fault: gripper.fault,
-                echo: Axes::new(&gripper.echo)?,
-                position: Axes::new(position).or(Axes::new(&gripper.position))?,
-                more: None,
-            })
-        });
+        let sample = newest.filter(|sample| sample.now_us >= status.now_us);
         let seen = Snapshot {
-            now,
+            now: self.devices.now(),
             state: sample.map_or(status.state, |sample| sample.state),
             clutch: self.clutch,
             calibration: self.calibration,
             frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
+            on_chip: true,
             frame: None,
+            sensors: self.devices.sensors(),
             angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),
             angles_valid: status.glove_answers && !self.useless,
-            distrusted: 0,
-            impossible: 0,
+            distrusted: self.devices.distrusted(),
+            impossible: self.devices.impossible(),
             command: newest.and_then(|sample| Axes::new(&sample.command)),
             sent: None,
-            gripper_answers: gripper.is_some(),
-            status: gripper,
-            stands: None,
+            gripper_answers: status.gripper.is_some(),
+            status: self.devices.gripper(),
+            stands: self.devices.stands(),
             glove_answers: status.glove_answers,
-            line: None,
+            line: self.devices.line(),
             late_steps: self.counted.1.late_steps,
         };
         self.hub.lock().say(seen, self.useless);

@@ -13,11 +13,13 @@ use bridge::event::Kind;
 use bridge::protocol::message;
 use bridge::telemetry::Counters;
 use bridge::{HoldReason, State};
+use gripper::link;
 
 use super::ending::Ending;
 use super::lasting::Lasting;
 use super::numbers::{Numbers, Progress};
 use super::record::Sort;
+use super::replies::Failed;
 use super::snapshot::Snapshot;
 use super::summary::Summary;
 use crate::realtime::Scheduling;
@@ -52,6 +54,8 @@ pub(super) enum Totals {
     OnChip {
         before: (message::Counters, Instant),
         newest: (message::Counters, Instant),
+        /// The gripper's line at the same two times, where the chip tells.
+        line: Option<[link::Counters; 2]>,
     },
 }
 
@@ -62,6 +66,7 @@ impl Totals {
         Self::OnChip {
             before,
             newest: before,
+            line: None,
         }
     }
 
@@ -72,9 +77,23 @@ impl Totals {
         }
     }
 
+    /// The same of its gripper's line.
+    pub fn line(&mut self, counters: &link::Counters) {
+        if let Self::OnChip { line, .. } = self {
+            let [before, _] = line.unwrap_or([*counters; 2]);
+            *line = Some([before, *counters]);
+        }
+    }
+
     fn begin(&mut self) {
-        if let Self::OnChip { before, newest } = self {
+        if let Self::OnChip {
+            before,
+            newest,
+            line,
+        } = self
+        {
             *before = *newest;
+            *line = line.map(|[_, now]| [now; 2]);
         }
     }
 }
@@ -174,9 +193,16 @@ impl Hub {
         match &said.totals {
             Totals::None => summary,
             Totals::InProcess(counters, scheduling) => summary.with(counters, *scheduling),
-            Totals::OnChip { before, newest } => {
+            Totals::OnChip {
+                before,
+                newest,
+                line,
+            } => {
                 let time = newest.1.saturating_duration_since(before.1);
-                summary.on_chip(&newest.0.since(&before.0), time)
+                Summary {
+                    gripper_failed: line.map(|[before, now]| Failed::between(&before, &now)),
+                    ..summary.on_chip(&newest.0.since(&before.0), time)
+                }
             }
         }
     }

@@ -2,11 +2,13 @@
 
 use super::PerAxis;
 use crate::protocol::wire;
-use glove::hand::SEGMENT_COUNT;
 use glove::scan;
 use gripper::Contact;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
+
+/// Most sensors whose fault is told at once; of more, those that come first.
+pub const CAUSES: usize = 3;
 
 /// What a bridge knows of its devices beside [`Status`](super::Status): which sensor is not used and why, what stops an axis, how
 /// the gripper's replies came.
@@ -16,8 +18,10 @@ pub struct Devices {
     pub now_us: u64,
     /// Since the newest good sample of the glove was asked for, milliseconds; `None` before the first.
     pub glove_age_ms: Option<u32>,
-    /// The sensors without a good sample in the newest frame.
-    pub sensors: Vec<UnusedSensor, SEGMENT_COUNT>,
+    /// Segments without a good sample in the newest frame (bit k: segment k).
+    pub missing: u16,
+    /// What is wrong with the first of them.
+    pub sensors: Vec<UnusedSensor, CAUSES>,
     /// Segments whose samples look good and are not used until the next calibration: they jumped or restarted (bit k: segment
     /// k).
     pub distrusted: u16,
