@@ -136,8 +136,10 @@ const SCAN_I2C: Duration = Duration::from_ticks(4_300);
 /// More than this from one question to the next one to the same sensor is a gap between scans: half as long again as a scan
 /// takes at `baud`, or as the `period` that scans are begun with. 42 ms at 115200 baud without a pause.
 pub fn scan_gap(baud: u32, period: Duration) -> Duration {
-    let scan = (serial(SCAN_BYTES, baud) + SCAN_I2C).max(period);
-    Duration::from_ticks(scan.as_ticks().saturating_add(scan.as_ticks() / 2))
+    let wire = serial(SCAN_BYTES, baud).as_ticks();
+    let scan = wire.saturating_add(SCAN_I2C.as_ticks());
+    let scan = scan.max(period.as_ticks());
+    Duration::from_ticks(scan.saturating_add(scan / 2))
 }
 
 /// `now + wait`, at the end of time at most.

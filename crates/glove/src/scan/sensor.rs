@@ -208,7 +208,9 @@ impl Sensor {
     fn doubts(&self, by: f32, elapsed: Duration) -> Option<Cause> {
         let was_away = !self.fresh || elapsed >= timing::PEAK_SPEED;
         // A gap that takes most of the time explains it; a short one in a long absence does not.
-        let explains = |pause: &Duration| !was_away || (self.fresh && *pause + *pause > elapsed);
+        let explains = |pause: &Duration| {
+            !was_away || (self.fresh && pause.as_ticks() > elapsed.as_ticks() / 2)
+        };
         if let Some(pause) = self.gap.filter(explains) {
             return (by > AGREE_WITHIN).then(|| Cause::Gap {
                 pause,
