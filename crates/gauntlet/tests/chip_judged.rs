@@ -105,7 +105,7 @@ fn a_watch_whose_glove_is_lost_until_its_end_has_failed_and_one_whose_glove_work
     let lost = |world: &World| world.glove.unplug(0, true);
     let output = engaged(false, lost).unwrap();
     let error = refusal(&output, 1);
-    assert!(error.contains("sensors lost: hand"), "{error}");
+    assert!(error.contains("sensor hand (missing"), "{error}");
     let jumped = |world: &World| jumps(&world.glove, 0);
     let output = engaged(false, jumped).unwrap();
     let error = refusal(&output, 1);
