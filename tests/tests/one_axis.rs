@@ -86,7 +86,7 @@ impl Session {
     fn start(
         model: Model,
         family: Family,
-        pose: impl FnMut(f64) -> [f32; 25] + Send + 'static,
+        pose: impl Fn(f64) -> [f32; 25] + Send + 'static,
     ) -> Self {
         let Devices {
             clock,
