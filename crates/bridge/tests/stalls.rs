@@ -101,9 +101,9 @@ fn after_a_sleep_nothing_rests_on_what_lay_in_the_ports() {
         bench.set_pose(FIST.map(|angle| angle * (rng.next_u32() % 100) as f32 / 100.0));
         bench.run(100 * MS + rng.next_u64() % 200_000);
         let before = bench.app.telemetry().sent_sequence;
-        let woke = bench.sleep([2 * S, 30 * S][round % 2]);
+        let woke = bench.sleep([300 * MS, 2 * S, 30 * S][round % 3]);
         // By little it is where it was left; far off nothing is written until a person says so.
-        let by = [12.0, 12.0, 12.0, 90.0][round / 2 % 4];
+        let by = [12.0, 12.0, 12.0, 90.0][round / 3 % 4];
         for axis in 0..3 {
             let here = bench.gripper.positions()[axis];
             let there = if here > 128.0 { here - by } else { here + by };
