@@ -37,8 +37,8 @@ impl World {
     }
 }
 
-/// `bridge engage` for some seconds on a bridge in QEMU; `breaks` is done once it says that the gripper follows the hand.
-fn engaged(jammed: bool, breaks: impl FnOnce(&World)) -> Option<Output> {
+/// `bridge engage` for some `seconds` on a bridge in QEMU; `breaks` is done once it says that the gripper follows the hand.
+fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<Output> {
     let firmware = find_firmware(None).ok().filter(|_| qemu_is_there());
     let Some(firmware) = firmware else {
         rig::skip::skipped(
@@ -74,7 +74,7 @@ fn engaged(jammed: bool, breaks: impl FnOnce(&World)) -> Option<Output> {
         "--calibrate-flat",
         "--seconds",
     ];
-    let mut child = command(&[&["bridge"][..], &words, &["10"]].concat())
+    let mut child = command(&[&["bridge"][..], &words, &[seconds]].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -98,23 +98,23 @@ fn engaged(jammed: bool, breaks: impl FnOnce(&World)) -> Option<Output> {
 
 #[test]
 fn a_watch_whose_glove_is_lost_until_its_end_has_failed_and_one_whose_glove_works_has_not() {
-    let Some(output) = engaged(false, |_| {}) else {
+    let Some(output) = engaged(false, "10", |_| {}) else {
         return;
     };
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     let lost = |world: &World| world.glove.unplug(0, true);
-    let output = engaged(false, lost).unwrap();
+    let output = engaged(false, "10", lost).unwrap();
     let error = refusal(&output, 1);
     assert!(error.contains("sensor hand (missing"), "{error}");
     let jumped = |world: &World| jumps(&world.glove, 0);
-    let output = engaged(false, jumped).unwrap();
+    let output = engaged(false, "10", jumped).unwrap();
     let error = refusal(&output, 1);
     assert!(error.contains("not calibrated"), "{error}");
 }
 
 #[test]
 fn a_watch_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
-    let Some(output) = engaged(true, |_| {}) else {
+    let Some(output) = engaged(true, "10", |_| {}) else {
         return;
     };
     let error = refusal(&output, 1);
@@ -125,12 +125,13 @@ fn a_watch_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
 fn a_chip_that_starts_anew_in_motion_is_told_as_that_and_the_watch_has_failed() {
     let bites = |world: &World| {
         world.until_commanded();
-        // The loop hangs, and the watchdog resets the chip a second later.
+        // The loop hangs, and the watchdog resets the chip a second later: that ends the run.
         debugger::patch_tick(&world.debugger, debugger::JUMP_TO_ITSELF);
     };
-    let Some(output) = engaged(false, bites) else {
+    let Some(output) = engaged(false, "60", bites) else {
         return;
     };
+    println!("{}", text(&output.stdout));
     let error = refusal(&output, 1);
     assert!(error.contains("restarted"), "{error}");
     let said = text(&output.stdout) + &text(&output.stderr);
@@ -143,7 +144,7 @@ fn a_hold_that_the_chips_gripper_did_not_confirm_is_not_told_as_one() {
         world.until_commanded();
         world.gripper.mute(u32::MAX);
     };
-    let Some(output) = engaged(false, cut) else {
+    let Some(output) = engaged(false, "10", cut) else {
         return;
     };
     let error = refusal(&output, 1);
