@@ -1,6 +1,6 @@
 //! The same loop with a gripper of one axis: the map's number of outputs follows the gripper's axes.
 
-use bridge::{App, Board, Config, Instant, Platform, State};
+use bridge::{App, Board, Config, Epoch, Instant, Platform, State};
 use glove::scan::Scanner;
 use gripper::Gripper;
 use gripper::driver::TwoFinger;
@@ -8,7 +8,8 @@ use gripper::registers::two_finger::Model;
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use loop_tests::bench::{Devices, empty_store};
 use loop_tests::nor_slot::NorSlot;
-use rig::gripper::Family;
+use rig::glove::VirtualGlove;
+use rig::gripper::{Family, VirtualGripper};
 use rig::{Clock, MemoryWire};
 
 /// The index finger's proximal flexion.
@@ -70,20 +71,30 @@ fn hand(closed: f32) -> [f32; 25] {
     core::array::from_fn(|joint| if joint == JOINT { closed } else { 0.0 })
 }
 
-#[test]
-fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
-    for (model, family) in [
-        (Model::TwoFinger85, Family::TwoFinger85),
-        (Model::TwoFinger140, Family::TwoFinger140),
-        (Model::HandE, Family::HandE),
-    ] {
+/// A hand, a gripper of one axis and the loop between them, its clutch closed and kept closed.
+struct Session {
+    clock: Clock,
+    glove: VirtualGlove,
+    gripper: VirtualGripper,
+    app: App<Machine, 1>,
+    epoch: Epoch,
+    beat: u64,
+}
+
+impl Session {
+    /// Nothing has moved yet; the sensors sit straight.
+    fn start(
+        model: Model,
+        family: Family,
+        pose: impl Fn(f64) -> [f32; 25] + Send + 'static,
+    ) -> Self {
         let Devices {
             clock,
             glove,
             glove_wire,
             gripper,
             gripper_wire,
-        } = Devices::with(|_| hand(0.1), family);
+        } = Devices::with(pose, family);
         gripper.preset_active();
         let mut store = empty_store(1);
         let image = image(1);
@@ -97,37 +108,55 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
             store,
             Config::default(),
         );
-        // The sensors sit straight.
         app.set_calibration(glove::hand::Calibration::identity());
-        let mut beat = 0;
-        let mut epoch = None;
-        let mut run = |seconds: u64| {
-            let end = clock.now().as_ticks() + seconds * 1_000_000;
-            while clock.now().as_ticks() < end {
-                let now = clock.now().as_ticks();
-                if now >= beat {
-                    match epoch {
-                        None => epoch = Some(app.engage()),
-                        Some(epoch) => assert_eq!(app.heartbeat(epoch), Ok(())),
-                    }
-                    beat = now + HEARTBEAT;
-                }
-                let due = app.step();
-                app.platform_mut()
-                    .wait_until(due.min(Instant::from_ticks(end)));
+        Self {
+            clock,
+            glove,
+            gripper,
+            epoch: app.engage(),
+            app,
+            beat: HEARTBEAT,
+        }
+    }
+
+    fn run_until(&mut self, second: u64) {
+        let end = Instant::from_ticks(second * 1_000_000);
+        while self.clock.now() < end {
+            if self.clock.now().as_ticks() >= self.beat {
+                assert_eq!(self.app.heartbeat(self.epoch), Ok(()));
+                self.beat += HEARTBEAT;
             }
-            let state = app.telemetry().state;
-            (state, gripper.positions()[0], app.gripper_mut().counters())
-        };
-        let (state, open, _) = run(5);
-        assert_eq!(state, State::Following, "{family:?}");
+            let due = self.app.step();
+            self.app.platform_mut().wait_until(due.min(end));
+        }
+    }
+
+    /// Where the gripper is, counts, once it follows.
+    fn followed(&self) -> f32 {
+        assert_eq!(self.app.telemetry().state, State::Following);
+        assert_eq!(self.app.telemetry().stands, None);
+        self.gripper.positions()[0]
+    }
+}
+
+#[test]
+fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
+    for (model, family) in [
+        (Model::TwoFinger85, Family::TwoFinger85),
+        (Model::TwoFinger140, Family::TwoFinger140),
+        (Model::HandE, Family::HandE),
+    ] {
+        let mut session = Session::start(model, family, |_| hand(0.1));
+        session.run_until(5);
+        let open = session.followed();
         assert!((open - 25.5).abs() < 3.0, "{family:?} {open}");
-        glove.set_pose(Box::new(|time_s: f64| {
+        session.glove.set_pose(Box::new(|time_s: f64| {
             hand((0.1 + (time_s - 5.0).clamp(0.0, 1.0) * 0.6) as f32)
         }));
-        let (state, closed, counters) = run(5);
+        session.run_until(10);
+        let closed = session.followed();
+        let counters = session.app.gripper_mut().counters();
         println!("{family:?}: {open:.0} to {closed:.0} counts; {counters:?}");
-        assert_eq!(state, State::Following, "{family:?}");
         assert!((closed - 178.5).abs() < 3.0, "{family:?} {closed}");
         // The two reads that told its family.
         assert_eq!(counters.timeouts, 2);
@@ -137,48 +166,15 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
 /// The gripper's cycles a second of a whole session, and where the hand's two ends put it: open from the start, a fist after
 /// `half` seconds.
 fn open_and_fist(model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]) {
-    let Devices {
-        clock,
-        glove: _glove,
-        glove_wire,
-        gripper,
-        gripper_wire,
-    } = Devices::with(
-        move |time_s| hand((time_s - half as f64).clamp(0.0, 1.0) as f32),
-        family,
-    );
-    gripper.preset_active();
-    let mut store = empty_store(1);
-    let image = image(1);
-    store.begin(image.len()).expect("room");
-    store.chunk(0, &image).expect("bytes");
-    store.commit().expect("an image of one output");
-    let mut app: App<_, 1> = App::new(
-        Machine(clock.clone()),
-        Scanner::new(glove_wire, glove::scan::Config::default()),
-        TwoFinger::new(gripper_wire, model, gripper::driver::Config::default()),
-        store,
-        Config::default(),
-    );
-    app.set_calibration(glove::hand::Calibration::identity());
-    let epoch = app.engage();
-    let (mut beat, mut ends, mut cycles) = (HEARTBEAT, [f32::NAN; 2], Vec::new());
+    let pose = move |time_s: f64| hand((time_s - half as f64).clamp(0.0, 1.0) as f32);
+    let mut session = Session::start(model, family, pose);
+    let (mut ends, mut cycles) = ([f32::NAN; 2], Vec::new());
     for second in 1..=2 * half {
-        let before = app.telemetry().status_sequence;
-        let end = Instant::from_ticks(second * 1_000_000);
-        while clock.now() < end {
-            if clock.now().as_ticks() >= beat {
-                assert_eq!(app.heartbeat(epoch), Ok(()));
-                beat += HEARTBEAT;
-            }
-            let due = app.step();
-            app.platform_mut().wait_until(due.min(end));
-        }
-        cycles.push(app.telemetry().status_sequence - before);
+        let before = session.app.telemetry().status_sequence;
+        session.run_until(second);
+        cycles.push(session.app.telemetry().status_sequence - before);
         if second % half == 0 {
-            assert_eq!(app.telemetry().state, State::Following, "{family:?}");
-            assert_eq!(app.telemetry().stands, None, "{family:?}");
-            ends[(second / half) as usize - 1] = gripper.positions()[0];
+            ends[(second / half) as usize - 1] = session.followed();
         }
     }
     (cycles, ends)

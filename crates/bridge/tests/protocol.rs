@@ -3,13 +3,15 @@
 mod common;
 
 use bridge::protocol::message::{
-    Answer, CHUNK, Call, FromBridge, Refusal, SlotContents, VERSION, WeightsKind,
+    Answer, CHUNK, Call, Devices, FromBridge, Refusal, SlotContents, UnusedSensor, VERSION,
+    WeightsKind,
 };
 use bridge::protocol::{Outcome, frame};
 use bridge::{Settings, State, store};
 use common::bench::{Bench, MS, S};
 use common::host::{Host, crc32, framed};
 use common::{hand_image, hand_image_int16};
+use glove::scan::Health;
 
 fn without_weights() -> Host {
     Host::new(Bench::with(
@@ -268,6 +270,56 @@ fn telemetry_comes_at_its_period_until_it_is_turned_off() {
     host.ask(Call::Telemetry { period_ms: 0 }).unwrap();
     host.run(500 * MS);
     assert_eq!(host.hear(), None);
+}
+
+fn devices(host: &mut Host) -> Devices {
+    match host.ask(Call::Devices) {
+        Ok(Answer::Devices(devices)) => devices,
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn a_chip_names_its_sensors_one_by_one_and_tells_how_old_things_are_and_how_replies_came() {
+    let mut host = following();
+    let calm = devices(&mut host);
+    assert_eq!(
+        (&calm.sensors[..], calm.distrusted, calm.impossible),
+        (&[][..], 0, 0)
+    );
+    assert!(calm.glove_age_ms.expect("frames come") < 60, "{calm:?}");
+    let gripper = calm.gripper.expect("it answers");
+    assert!(gripper.age_ms < 30 && gripper.going_to && gripper.axes.len() == 4);
+    assert!(
+        calm.replies.right > 100 && calm.replies.late == 0,
+        "{:?}",
+        calm.replies
+    );
+    host.bench.glove.unplug(7, true);
+    host.bench
+        .glove
+        .set_heading(4, core::f32::consts::FRAC_PI_2);
+    host.bench.gripper.mute(5);
+    host.run(S);
+    let told = devices(&mut host);
+    let [
+        UnusedSensor {
+            segment: 7,
+            health: Health::Missing(_),
+        },
+    ] = told.sensors[..]
+    else {
+        panic!("{:?}", told.sensors)
+    };
+    assert_eq!(told.distrusted, 1 << 4);
+    assert_eq!(told.replies.missed - calm.replies.missed, 5);
+    host.bench.gripper.mute(u32::MAX);
+    (0..16).for_each(|k| host.bench.glove.unplug(k, true));
+    host.run(700 * MS);
+    let gone = devices(&mut host);
+    assert!(gone.gripper.expect("known").age_ms >= 680);
+    assert!(gone.glove_age_ms.expect("known") >= 650);
+    assert_eq!((gone.missing, gone.sensors.len()), (0xFFFF, 3));
 }
 
 #[test]

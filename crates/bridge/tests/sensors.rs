@@ -193,6 +193,25 @@ fn after_a_sensor_was_away_its_joints_go_gently_to_where_they_are_now() {
     }
 }
 
+#[test]
+fn a_computer_that_reads_late_while_the_hand_closes_costs_a_hold_and_no_calibration() {
+    for ms in [20, 45, 80, 95, 120, 180] {
+        let mut bench = following();
+        bench.set_pose(FIST);
+        bench.run(40 * MS);
+        bench.clock.advance(rig::Duration::from_millis(ms));
+        bench.run(4 * S);
+        assert!(
+            !found(&bench, |finding| matches!(finding, Finding::Jumped { .. })),
+            "{ms}"
+        );
+        let seen = bench.app.telemetry();
+        assert_eq!((seen.distrusted, seen.held_joints), (0, 0), "{ms}");
+        assert!((seen.angles[5] - FIST[5]).abs() < 0.01, "{ms}");
+        assert_eq!(bench.state(), State::Following, "{ms}");
+    }
+}
+
 /// A frame of these orientations.
 fn frame(orientations: [glove::hand::Quaternion; 16], sequence: u32) -> glove::scan::Frame {
     glove::scan::Frame {

@@ -84,3 +84,48 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
     );
     assert!(commands > STALLS * 3 / 4, "{commands} commands");
 }
+
+/// A laptop's lid closes in motion: the bridge's clock goes on, the ports keep the bytes that were on their way, and somebody
+/// moves the gripper meanwhile.
+#[test]
+fn after_a_sleep_nothing_rests_on_what_lay_in_the_ports() {
+    let mut rng = ChaCha8Rng::seed_from_u64(SEED);
+    let mut bench = Bench::new(Settings::default());
+    bench.ready();
+    let mut commands = 0;
+    for round in 0..400 {
+        bench.release();
+        bench.run(100 * MS);
+        bench.clutch = true;
+        bench.until("following", |bench| bench.state() == State::Following);
+        bench.set_pose(FIST.map(|angle| angle * (rng.next_u32() % 100) as f32 / 100.0));
+        bench.run(100 * MS + rng.next_u64() % 200_000);
+        let before = bench.app.telemetry().sent_sequence;
+        let woke = bench.sleep([300 * MS, 2 * S, 30 * S][round % 3]);
+        // By little it is where it was left; far off nothing is written until a person says so.
+        let by = [12.0, 12.0, 12.0, 90.0][round / 3 % 4];
+        for axis in 0..3 {
+            let here = bench.gripper.positions()[axis];
+            let there = if here > 128.0 { here - by } else { here + by };
+            bench.gripper.set_position(axis, there);
+        }
+        let end = bench.now() + 300 * MS;
+        let mut first = true;
+        while bench.now() < end {
+            let positions = bench.gripper.positions();
+            bench.step();
+            let seen = bench.app.telemetry();
+            if seen.sent_sequence != before {
+                let sent = seen.sent.expect("it left");
+                assert!(sent.stamp >= woke && sent.decided >= woke, "{round}");
+                for (here, told) in positions.iter().zip(sent.motion.position) {
+                    let off = (here - f32::from(told)).abs();
+                    assert!(!first || off <= BETWEEN, "{round}: {off} counts off");
+                }
+                commands += u32::from(std::mem::take(&mut first));
+            }
+        }
+    }
+    println!("seed {SEED}: {commands} first commands");
+    assert!(commands > 200, "{commands} commands");
+}

@@ -4,12 +4,14 @@
 use bridge::calibration::{CalibrationState, Refusal as NotTaken, Try};
 use bridge::clutch::{HeartbeatRefusal, Position};
 use bridge::glove::hand::Side;
-use bridge::gripper::{Activation, registers::Fault};
+use bridge::glove::{bus, imu, scan};
+use bridge::gripper::{Activation, Contact, registers::Fault};
 use bridge::hae::image::{self, JointOrder};
 use bridge::protocol::frame;
 use bridge::protocol::message::{
-    Answer, Call, Configuration, Counters, FromBridge, GripperStatus, Health, Hello, Refusal,
-    Reply, Request, Restart, Sample, SlotContents, Slots, Status, VERSION, WeightsKind,
+    Answer, AxisDetail, CAUSES, Call, Configuration, Counters, Devices, FromBridge, GripperDetail,
+    GripperStatus, Health, Hello, Refusal, Replies, Reply, Request, Restart, Sample, SlotContents,
+    Slots, Status, UnusedSensor, VERSION, WeightsKind,
 };
 use bridge::{GripperFault, HoldReason, SafeAction, State, filter, store};
 use embedded_storage::nor_flash::NorFlashErrorKind;
@@ -401,46 +403,174 @@ fn samples() -> Vec<Sample> {
     all
 }
 
-/// Every message as the lines of the golden file; each is read back from its bytes on the way.
-fn lines() -> Vec<String> {
-    let mut text = Vec::new();
-    let mut room = [0; frame::MAX_MESSAGE];
-    for call in calls() {
-        let request = Request {
-            session: 7,
-            sequence: 300,
-            call,
-        };
-        let bytes = postcard::to_slice(&request, &mut room).expect("room");
-        assert_eq!(
-            postcard::from_bytes::<Request<'_>>(bytes).as_ref(),
-            Ok(&request)
-        );
-        text.push(hex(bytes));
-    }
-    let reply = |answer| {
-        FromBridge::Reply(Reply {
-            session: 70_000,
-            sequence: 2,
-            answer,
-        })
+fn sensor_errors() -> Vec<imu::Error> {
+    let register = 0x20;
+    let mut all: Vec<imu::Error> = bus_errors().map(imu::Error::Mux).into();
+    all.extend(bus_errors().map(|cause| imu::Error::Bus { register, cause }));
+    all.extend([
+        imu::Error::ChipId(7),
+        imu::Error::SameSensor { segment: 15 },
+        imu::Error::OtherSensor,
+        imu::Error::ReadBack {
+            register: 0x3D,
+            wrote: 8,
+            read: 12,
+        },
+        imu::Error::NotRunning {
+            status: 1,
+            error: 2,
+        },
+        imu::Error::NoSample,
+    ]);
+    all.extend(sample_faults().map(imu::Error::Rejected));
+    all
+}
+
+fn sample_faults() -> [imu::Fault; 8] {
+    [
+        imu::Fault::Zero,
+        imu::Fault::NotUnit,
+        imu::Fault::Restarted,
+        imu::Fault::TooFast,
+        imu::Fault::Away,
+        imu::Fault::Frozen,
+        imu::Fault::AllFrozen,
+        imu::Fault::Twin,
+    ]
+}
+
+fn bus_errors() -> [bus::Error; 13] {
+    [
+        bus::Error::NackAddress,
+        bus::Error::NackData,
+        bus::Error::BusTimeout,
+        bus::Error::Lost {
+            expected: 8,
+            received: 3,
+        },
+        bus::Error::Stalled,
+        bus::Error::Status(9),
+        bus::Error::NoAnswer,
+        bus::Error::Port,
+        bus::Error::Busy,
+        bus::Error::TooLong {
+            length: 300,
+            limit: 16,
+        },
+        bus::Error::Unsupported,
+        bus::Error::ClockStopped,
+        bus::Error::Other,
+    ]
+}
+
+fn devices() -> Vec<Devices> {
+    let with = |healths: &[scan::Health], gripper| Devices {
+        now_us: 12_345_678_901,
+        glove_age_ms: Some(300),
+        missing: 0x4003,
+        sensors: (0..)
+            .zip(healths)
+            .map(|(segment, health)| UnusedSensor {
+                segment,
+                health: *health,
+            })
+            .collect(),
+        distrusted: 0x8001,
+        impossible: 0x0102,
+        gripper,
+        stands: Some(2),
+        replies: Replies {
+            requests: 1_000,
+            right: 900,
+            missed: 50,
+            late: 20,
+            refused: 10,
+            foreign: 11,
+            corrupt: 12,
+        },
     };
-    let replies = answers()
-        .into_iter()
-        .map(Ok)
-        .chain(refusals().into_iter().map(Err));
-    let messages = replies
-        .map(reply)
-        .chain(samples().into_iter().map(FromBridge::Sample));
-    for message in messages {
-        let bytes = postcard::to_slice(&message, &mut room).expect("room");
-        assert_eq!(
-            postcard::from_bytes::<FromBridge>(bytes).as_ref(),
-            Ok(&message)
-        );
-        text.push(hex(bytes));
-    }
+    let mut healths = vec![scan::Health::Good, scan::Health::Starting];
+    healths.extend(sensor_errors().into_iter().map(scan::Health::Missing));
+    healths.extend(sample_faults().map(scan::Health::Rejected));
+    let contacts = [
+        Contact::Moving,
+        Contact::ContactOpening,
+        Contact::ContactClosing,
+        Contact::AtPosition,
+    ];
+    let mut all: Vec<Devices> = healths
+        .chunks(CAUSES)
+        .map(|healths| {
+            let axes = contacts.map(|contact| AxisDetail {
+                contact,
+                current: 200,
+            });
+            let gripper = GripperDetail {
+                age_ms: 400,
+                going_to: true,
+                axes: axes.into_iter().collect(),
+            };
+            with(healths, Some(gripper))
+        })
+        .collect();
+    all.push(Devices {
+        glove_age_ms: None,
+        stands: None,
+        ..with(&[], None)
+    });
+    all
+}
+
+/// Every message as the lines of the golden file: those that version 3 began with, and at the end those appended since.
+fn lines() -> Vec<String> {
+    let mut text = lines_of(calls(), answers());
+    let appended = devices().into_iter().map(Answer::Devices).collect();
+    let appended = lines_of(vec![Call::Devices], appended);
+    let samples = samples().into_iter().map(FromBridge::Sample);
+    let refusals = refusals().into_iter().map(Err).map(reply);
+    text.extend(refusals.chain(samples).map(|message| line(&message)));
+    text.extend(appended);
     text
+}
+
+fn lines_of(calls: Vec<Call<'static>>, answers: Vec<Answer>) -> Vec<String> {
+    let mut text: Vec<String> = calls.into_iter().map(request_line).collect();
+    text.extend(answers.into_iter().map(|answer| line(&reply(Ok(answer)))));
+    text
+}
+
+/// Read back from its bytes on the way.
+fn request_line(call: Call<'static>) -> String {
+    let mut room = [0; frame::MAX_MESSAGE];
+    let request = Request {
+        session: 7,
+        sequence: 300,
+        call,
+    };
+    let bytes = postcard::to_slice(&request, &mut room).expect("room");
+    assert_eq!(
+        postcard::from_bytes::<Request<'_>>(bytes).as_ref(),
+        Ok(&request)
+    );
+    hex(bytes)
+}
+
+fn line(message: &FromBridge) -> String {
+    let mut room = [0; frame::MAX_MESSAGE];
+    let bytes = postcard::to_slice(message, &mut room).expect("room");
+    assert_eq!(
+        postcard::from_bytes::<FromBridge>(bytes).as_ref(),
+        Ok(message)
+    );
+    hex(bytes)
+}
+
+fn reply(answer: Result<Answer, Refusal>) -> FromBridge {
+    FromBridge::Reply(Reply {
+        session: 70_000,
+        sequence: 2,
+        answer,
+    })
 }
 
 #[test]

@@ -12,6 +12,7 @@
 
 pub mod cli;
 pub mod commands;
+mod flat_hand;
 pub mod live;
 pub mod options;
 pub mod out;

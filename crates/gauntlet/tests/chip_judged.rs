@@ -1,20 +1,44 @@
 //! How a watch of a bridge on a chip is judged at its end. Skipped, with a word, where QEMU or the firmware is missing.
 #![allow(missing_docs, clippy::unwrap_used)]
 
+#[path = "../../../tests/src/debugger.rs"]
+#[allow(dead_code)]
+mod debugger;
 mod support;
 
+use std::path::PathBuf;
 use std::process::{Output, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use host::chip::emulator::{Emulator, Setup, find_firmware, qemu_is_there};
 use rig::glove::VirtualGlove;
-use rig::gripper::Config;
+use rig::gripper::{Config, VirtualGripper};
 use support::bench::{hand, jam, jumps};
 use support::{command, devices, model, refusal, run, text, until_line, wait};
 
-/// `bridge engage` for some seconds on a bridge in QEMU; `breaks` is done to the glove once the gripper follows the hand.
-fn engaged(jammed: bool, breaks: impl FnOnce(&VirtualGlove)) -> Option<Output> {
+/// What a test can break.
+struct World {
+    glove: VirtualGlove,
+    gripper: VirtualGripper,
+    /// The chip's debugger port.
+    debugger: PathBuf,
+}
+
+impl World {
+    /// Waits until the gripper was told something: what the tool says of it comes later or sooner.
+    fn until_commanded(&self) {
+        let end = Instant::now() + Duration::from_secs(60);
+        while self.gripper.writes() == 0 {
+            assert!(Instant::now() < end, "never commanded");
+            std::thread::sleep(Duration::from_millis(5));
+        }
+    }
+}
+
+/// `bridge engage` for some `seconds` on a bridge in QEMU; `breaks` is done once it says that the gripper follows the hand.
+fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<Output> {
     let firmware = find_firmware(None).ok().filter(|_| qemu_is_there());
     let Some(firmware) = firmware else {
         rig::skip::skipped(
@@ -36,7 +60,7 @@ fn engaged(jammed: bool, breaks: impl FnOnce(&VirtualGlove)) -> Option<Output> {
         firmware,
         glove: Some(glove_port.path().to_owned()),
         gripper: Some(gripper_port.path().to_owned()),
-        debugger: false,
+        debugger: true,
     })
     .unwrap();
     drop(emulator.link().unwrap());
@@ -50,14 +74,18 @@ fn engaged(jammed: bool, breaks: impl FnOnce(&VirtualGlove)) -> Option<Output> {
         "--calibrate-flat",
         "--seconds",
     ];
-    let mut child = command(&[&["bridge"][..], &words, &["10"]].concat())
+    let mut child = command(&[&["bridge"][..], &words, &[seconds]].concat())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
     let said = until_line(child.stdout.take().unwrap(), "following");
     moves.store(true, Ordering::Relaxed);
-    breaks(&glove);
+    breaks(&World {
+        glove,
+        gripper,
+        debugger: emulator.debugger(),
+    });
     let status = wait(&mut child);
     let mut stderr = Vec::new();
     std::io::Read::read_to_end(child.stderr.as_mut().unwrap(), &mut stderr).unwrap();
@@ -70,25 +98,57 @@ fn engaged(jammed: bool, breaks: impl FnOnce(&VirtualGlove)) -> Option<Output> {
 
 #[test]
 fn a_watch_whose_glove_is_lost_until_its_end_has_failed_and_one_whose_glove_works_has_not() {
-    let Some(output) = engaged(false, |_| {}) else {
+    let Some(output) = engaged(false, "10", |_| {}) else {
         return;
     };
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
-    let lost = |glove: &VirtualGlove| glove.unplug(0, true);
-    let output = engaged(false, lost).unwrap();
+    let lost = |world: &World| world.glove.unplug(0, true);
+    let output = engaged(false, "10", lost).unwrap();
     let error = refusal(&output, 1);
-    assert!(error.contains("sensors lost: hand"), "{error}");
-    let jumped = |glove: &VirtualGlove| jumps(glove, 0);
-    let output = engaged(false, jumped).unwrap();
+    assert!(error.contains("sensor hand (missing"), "{error}");
+    let jumped = |world: &World| jumps(&world.glove, 0);
+    let output = engaged(false, "10", jumped).unwrap();
     let error = refusal(&output, 1);
     assert!(error.contains("not calibrated"), "{error}");
 }
 
 #[test]
 fn a_watch_whose_gripper_was_told_to_move_and_never_moved_has_failed() {
-    let Some(output) = engaged(true, |_| {}) else {
+    let Some(output) = engaged(true, "10", |_| {}) else {
         return;
     };
     let error = refusal(&output, 1);
     assert!(error.contains("never moved"), "{error}");
+}
+
+#[test]
+fn a_chip_that_starts_anew_in_motion_is_told_as_that_and_the_watch_has_failed() {
+    let bites = |world: &World| {
+        world.until_commanded();
+        // The loop hangs, and the watchdog resets the chip a second later: that ends the run.
+        debugger::patch_tick(&world.debugger, debugger::JUMP_TO_ITSELF);
+    };
+    let Some(output) = engaged(false, "60", bites) else {
+        return;
+    };
+    println!("{}", text(&output.stdout));
+    let error = refusal(&output, 1);
+    assert!(error.contains("restarted"), "{error}");
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert!(!said.contains("is held"), "{said}");
+}
+
+#[test]
+fn a_hold_that_the_chips_gripper_did_not_confirm_is_not_told_as_one() {
+    let cut = |world: &World| {
+        world.until_commanded();
+        world.gripper.mute(u32::MAX);
+    };
+    let Some(output) = engaged(false, "10", cut) else {
+        return;
+    };
+    let error = refusal(&output, 1);
+    assert!(error.contains("hold was not confirmed"), "{error}");
+    let said = text(&output.stdout) + &text(&output.stderr);
+    assert!(!said.contains("is held"), "{said}");
 }

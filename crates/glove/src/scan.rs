@@ -18,6 +18,7 @@ mod finding;
 mod frozen;
 mod machine;
 mod sensor;
+mod suspect;
 mod together;
 mod twins;
 mod unique;

@@ -13,6 +13,9 @@ pub trait PoseSource: Send {
 
     /// A client has opened the glove's port, which nobody had open.
     fn opened(&mut self) {}
+
+    /// Somebody asks the hand to lie flat until it is asked to move again, or to move.
+    fn lie_flat(&mut self, _flat: bool) {}
 }
 
 /// How long [`FlatFirst`] lies flat, seconds: a calibration needs one of them.
@@ -23,11 +26,22 @@ pub const RISE_S: f64 = 1.0;
 /// A hand that first lies flat, so that it can be calibrated, and then moves.
 ///
 /// It lies flat from when the glove's port is opened until the first sensor has been read for [`FLAT_S`], goes to the
-/// motion's beginning in [`RISE_S`], and plays the motion from there. When the port is opened anew it lies flat anew.
+/// motion's beginning in [`RISE_S`], and plays the motion from there. When the port is opened anew it lies flat anew. Asked to
+/// lie flat it goes there in [`RISE_S`], and lies until it is asked to move.
 pub struct FlatFirst {
     motion: Box<dyn PoseSource>,
-    /// When it was first asked since the port was opened.
-    began: Option<f64>,
+    /// When its motion begins or began; `None` before it was first asked since the port was opened.
+    begins: Option<f64>,
+    asked: Option<bool>,
+    lying: Option<Lying>,
+}
+
+/// Asked to lie flat.
+struct Lying {
+    since: f64,
+    from: [f32; 25],
+    /// When it may move again.
+    until: f64,
 }
 
 impl FlatFirst {
@@ -36,26 +50,68 @@ impl FlatFirst {
     pub fn new(motion: Box<dyn PoseSource>) -> Self {
         Self {
             motion,
-            began: None,
+            begins: None,
+            asked: None,
+            lying: None,
         }
     }
-}
 
-impl PoseSource for FlatFirst {
-    fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
-        let time = time_s - *self.began.get_or_insert(time_s) - FLAT_S;
+    fn pose(&mut self, time_s: f64) -> [f32; 25] {
+        if let Some(lying) = self.lying.as_ref().filter(|lying| time_s < lying.until) {
+            let there = smooth((time_s - lying.since) / RISE_S);
+            return lying.from.map(|angle| angle * (1.0 - there));
+        }
+        let time = time_s - *self.begins.get_or_insert(time_s + FLAT_S);
         if !time.is_finite() || time <= 0.0 {
             return [0.0; 25];
         }
         let pose = self.motion.pose_at((time - RISE_S).max(0.0));
-        let t = (time / RISE_S).min(1.0) as f32;
-        // Begins and ends gently.
-        pose.map(|angle| angle * t * t * (3.0 - 2.0 * t))
+        let there = smooth(time / RISE_S);
+        pose.map(|angle| angle * there)
+    }
+
+    fn turn(&mut self, flat: bool, now: f64) {
+        match &mut self.lying {
+            Some(lying) if !flat && lying.until.is_infinite() => {
+                // Not before it lies.
+                lying.until = now.max(lying.since + RISE_S);
+                self.begins = Some(lying.until);
+            }
+            Some(lying) if lying.until > now => lying.until = f64::INFINITY,
+            _ if flat => {
+                let from = self.pose(now);
+                self.lying = Some(Lying {
+                    since: now,
+                    from,
+                    until: f64::INFINITY,
+                });
+            }
+            _ => {}
+        }
+    }
+}
+
+/// From 0 to 1, beginning and ending gently.
+fn smooth(t: f64) -> f32 {
+    let t = t.clamp(0.0, 1.0) as f32;
+    t * t * (3.0 - 2.0 * t)
+}
+
+impl PoseSource for FlatFirst {
+    fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
+        if let Some(flat) = self.asked.take() {
+            self.turn(flat, time_s);
+        }
+        self.pose(time_s)
     }
 
     fn opened(&mut self) {
-        self.began = None;
+        self.begins = None;
         self.motion.opened();
+    }
+
+    fn lie_flat(&mut self, flat: bool) {
+        self.asked = Some(flat);
     }
 }
 
@@ -257,5 +313,31 @@ mod tests {
         );
         let e = Recorded::new(vec![0.0, 1.0, 1.0], vec![row(0.0); 3]).unwrap_err();
         assert_eq!(e, RecordedError::Time { row: 2, value: 1.0 });
+    }
+
+    #[test]
+    fn a_hand_that_is_asked_to_lie_flat_goes_there_gently_and_stays_until_it_is_asked_to_move() {
+        let mut hand = FlatFirst::new(Box::new(|_: f64| row(1.0)));
+        for at in [0.0, 10.0] {
+            hand.pose_at(at);
+        }
+        hand.lie_flat(true);
+        let on_the_way: Vec<f32> = (0..=10)
+            .map(|tenth| hand.pose_at(10.0 + 0.1 * f64::from(tenth))[0])
+            .collect();
+        assert!(on_the_way.windows(2).all(|two| two[0] - two[1] < 0.16));
+        assert_eq!(on_the_way.last(), Some(&0.0));
+        // Also where a program opens the port meanwhile.
+        hand.opened();
+        assert_eq!(hand.pose_at(300.0), row(0.0));
+        hand.lie_flat(false);
+        assert_eq!(hand.pose_at(300.1), row(0.0));
+        assert_eq!(hand.pose_at(301.2), row(1.0));
+        // Asked twice, it goes on.
+        hand.lie_flat(false);
+        assert_eq!(hand.pose_at(301.3), row(1.0));
+        hand.lie_flat(true);
+        hand.pose_at(302.0);
+        assert_eq!(hand.pose_at(303.1), row(0.0));
     }
 }

@@ -159,6 +159,32 @@ fn a_command_while_activating_is_late_with_fault_05() {
 }
 
 #[test]
+fn every_activation_runs_the_fingers_through_their_stroke_one_after_a_reset_too() {
+    let mut bench = active();
+    bench.command(&individual([100, 110, 120, 130], 255));
+    bench.settle();
+    bench.command(&[0; 16]);
+    assert_eq!(bench.status(1)[0], 0x00);
+    bench.command(&[1, 0, 0, 0, 0, 0]);
+    let mut farthest = [0.0f32; 3];
+    for _ in 0..500 {
+        let positions = bench.gripper.positions();
+        for (most, now) in farthest.iter_mut().zip(positions) {
+            *most = most.max(now);
+        }
+        if bench.status(1)[0] & 0x30 == 0x30 {
+            assert!(farthest.iter().all(|most| *most > 240.0), "{farthest:?}");
+            assert!(
+                positions[..3].iter().all(|now| *now < 10.0),
+                "{positions:?}"
+            );
+            return;
+        }
+    }
+    panic!("never ready");
+}
+
+#[test]
 fn a_finger_goes_at_22_to_110_mm_a_second() {
     for (register, counts_per_s) in [(0u8, 36.2), (255, 181.0), (128, 108.9)] {
         let mut bench = active();
@@ -335,7 +361,8 @@ fn automatic_release_opens_slowly_overrides_and_ends_in_fault_0f() {
     assert_eq!(bench.status(8)[2], 0x0F);
     bench.command(&[0; 6]);
     bench.command(&individual([100, 100, 100, 137], 100));
-    bench.wait_ms(1_000);
+    // Through the whole stroke first.
+    bench.wait_ms(4_000);
     bench.settle();
     assert_eq!(
         (bench.status(8)[2], bench.gripper.positions()[0]),

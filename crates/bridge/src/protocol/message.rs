@@ -15,9 +15,11 @@ use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
 mod counters;
+mod devices;
 mod health;
 
 pub use counters::Counters;
+pub use devices::{AxisDetail, CAUSES, Devices, GripperDetail, Replies, UnusedSensor};
 pub use health::{Health, Restart};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.
@@ -113,6 +115,9 @@ pub enum Call<'a> {
     CalibrateUndo,
     /// Clutch, calibration, why the bridge started. Answer: [`Answer::Health`].
     Health,
+    /// Sensors and axes one by one, the gripper's line. A bridge from before this call says nothing to it. Answer:
+    /// [`Answer::Devices`].
+    Devices,
 }
 
 /// From the bridge.
@@ -164,6 +169,8 @@ pub enum Answer {
     },
     /// To health.
     Health(Health),
+    /// To devices.
+    Devices(Devices),
 }
 
 /// What the bridge is.

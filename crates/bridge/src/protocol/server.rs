@@ -8,7 +8,7 @@ use super::message::{
 };
 use super::outgoing::Outgoing;
 use super::slow::{Reading, Slow};
-use super::telling::status;
+use super::telling::{devices, status};
 use crate::store::WeightsStore;
 use crate::{App, Board, Config, Duration, Instant, Slot, timing};
 use embedded_io::{Read, ReadReady, Write};
@@ -285,6 +285,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
                 .map(|app| app.undo_calibration())
                 .map(|()| Answer::Done),
             Call::Health => Ok(Answer::Health(self.health(app))),
+            Call::Devices => Ok(Answer::Devices(devices(app))),
             Call::Telemetry { period_ms } => self.set_telemetry(now, *period_ms),
             Call::Reboot => {
                 idle(app)?;

@@ -12,7 +12,8 @@ use crate::clutch::{Epoch, HeartbeatRefusal, Position};
 use crate::{CalibrationState, GripperFault, HoldReason, SafeAction, State, filter, store};
 use embedded_storage::nor_flash::NorFlashErrorKind;
 use glove::hand::Side;
-use gripper::{Activation, registers::Fault};
+use glove::{bus, imu, scan};
+use gripper::{Activation, Contact, registers::Fault};
 use hae::image::{self, JointOrder};
 use serde::{Deserialize, Serialize};
 
@@ -308,6 +309,82 @@ enum WireImageError {
 enum WireJointOrder {
     Hand25,
     Columns,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "Contact")]
+pub(super) enum WireContact {
+    Moving,
+    ContactOpening,
+    ContactClosing,
+    AtPosition,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "scan::Health")]
+pub(super) enum WireSensorHealth {
+    Good,
+    Starting,
+    Missing(#[serde(with = "WireSensorError")] imu::Error),
+    Rejected(#[serde(with = "WireSampleFault")] imu::Fault),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "imu::Fault")]
+enum WireSampleFault {
+    Zero,
+    NotUnit,
+    Restarted,
+    TooFast,
+    Away,
+    Frozen,
+    AllFrozen,
+    Twin,
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "imu::Error")]
+enum WireSensorError {
+    Mux(#[serde(with = "WireBusError")] bus::Error),
+    Bus {
+        register: u8,
+        #[serde(with = "WireBusError")]
+        cause: bus::Error,
+    },
+    ChipId(u8),
+    SameSensor {
+        segment: u8,
+    },
+    OtherSensor,
+    ReadBack {
+        register: u8,
+        wrote: u8,
+        read: u8,
+    },
+    NotRunning {
+        status: u8,
+        error: u8,
+    },
+    NoSample,
+    Rejected(#[serde(with = "WireSampleFault")] imu::Fault),
+}
+
+#[derive(Serialize, Deserialize)]
+#[serde(remote = "bus::Error")]
+enum WireBusError {
+    NackAddress,
+    NackData,
+    BusTimeout,
+    Lost { expected: u8, received: u8 },
+    Stalled,
+    Status(u8),
+    NoAnswer,
+    Port,
+    Busy,
+    TooLong { length: usize, limit: usize },
+    Unsupported,
+    ClockStopped,
+    Other,
 }
 
 /// The kind of a flash error as one number: the outside crate's type is open-ended.

@@ -9,23 +9,32 @@ use rig::flash::Power;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex};
 
 pub const MS: u64 = 1_000;
 pub const S: u64 = 1_000_000;
 
 /// Time moves to the next event; a step of the loop costs 50 µs.
-pub struct Virtual(pub Clock);
+pub struct Virtual {
+    /// The wires' and the devices' time.
+    clock: Clock,
+    /// By how much the bridge's time is ahead of it, µs: its clock went on while the machine slept.
+    ahead: Arc<AtomicU64>,
+}
 
 impl Platform for Virtual {
     fn now(&mut self) -> Instant {
-        self.0.now()
+        let ahead = self.ahead.load(Ordering::Relaxed);
+        Instant::from_ticks(self.clock.now().as_ticks() + ahead)
     }
 
     fn wait_until(&mut self, due: Instant) {
-        self.0.advance(rig::Duration::from_micros(50));
-        if due > self.0.now() {
-            self.0.wait_until(due);
+        self.clock.advance(rig::Duration::from_micros(50));
+        if due > self.now() {
+            let ahead = self.ahead.load(Ordering::Relaxed);
+            self.clock
+                .wait_until(Instant::from_ticks(due.as_ticks() - ahead));
         }
     }
 }
@@ -41,6 +50,7 @@ pub type Loop = App<Virtual, 4>;
 /// The loop and what it is connected to.
 pub struct Bench {
     pub clock: Clock,
+    ahead: Arc<AtomicU64>,
     pub glove: VirtualGlove,
     pub glove_wire: MemoryWire,
     pub gripper: VirtualGripper,
@@ -96,6 +106,7 @@ impl Bench {
         driver: gripper::driver::Config,
     ) -> Self {
         let clock = Clock::new();
+        let ahead = Arc::new(AtomicU64::new(0));
         let pose = Arc::new(Mutex::new([0.0; 25]));
         let glove = VirtualGlove::new(
             Box::new(moving(pose.clone())),
@@ -113,7 +124,10 @@ impl Bench {
             store.commit().expect("a sound image");
         }
         let app = App::new(
-            Virtual(clock.clone()),
+            Virtual {
+                clock: clock.clone(),
+                ahead: Arc::clone(&ahead),
+            },
             glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
             ThreeFinger::new(gripper_wire.clone(), driver),
             store,
@@ -121,6 +135,7 @@ impl Bench {
         );
         Self {
             clock,
+            ahead,
             glove,
             glove_wire,
             gripper,
@@ -137,6 +152,12 @@ impl Bench {
 
     pub fn now(&self) -> u64 {
         self.clock.now().as_ticks()
+    }
+
+    /// The machine sleeps for so long: its clock goes on, wires and devices keep what they had. Returns the bridge's time after it.
+    pub fn sleep(&mut self, us: u64) -> Instant {
+        self.ahead.fetch_add(us, Ordering::Relaxed);
+        self.app.platform_mut().now()
     }
 
     pub fn set_pose(&self, pose: [f32; 25]) {

@@ -86,6 +86,7 @@ fn call(kind: u8, value: u32, bytes: &[u8]) -> Call<'_> {
             period_ms: value as u16,
         },
         14 => Call::Health,
+        _ if value % 2 == 1 => Call::Devices,
         _ => Call::CalibrateUndo,
     }
 }

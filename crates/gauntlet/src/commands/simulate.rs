@@ -1,7 +1,7 @@
 //! `gauntlet simulate`: virtual devices behind pseudo-terminals, or a gripper behind a TCP port, for any program that
 //! speaks to the real ones.
 
-use std::io::ErrorKind;
+use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -13,6 +13,7 @@ use rig::gripper::tcp::TcpHandle;
 use rig::gripper::{Family, VirtualGripper};
 use rig::pty::{Handle, PtyDevice};
 
+use crate::flat_hand::Hand;
 use crate::options::model_parser;
 use crate::played;
 use crate::progress::Person;
@@ -26,8 +27,8 @@ use host::probe;
 use host::realtime;
 use host::training::motion::Motion;
 
-/// How often the wait for Ctrl-C looks around.
-const WATCH: Duration = Duration::from_secs(3600);
+/// How often the wait for Ctrl-C looks for a line on standard input.
+const WATCH: Duration = Duration::from_millis(100);
 /// How often the sensors are looked at while they boot (650 ms).
 const LOOK: Duration = Duration::from_millis(20);
 /// Where the devices are linked when no path is given.
@@ -42,12 +43,13 @@ Examples:
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors   (in another terminal)
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
 ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
 takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
-The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves. \
+The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
+Enter lays it flat at any time, and Enter again lets it move. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -97,7 +99,15 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     if !interrupt.asked() {
         say!("ready");
     }
-    while !interrupt.sleep(WATCH) {}
+    let mut hand = glove.as_ref().map(|glove| Hand::of(&glove.device));
+    if hand.is_some() && std::io::stdin().is_terminal() {
+        say!("Enter lays the virtual hand flat, to be calibrated; Enter again lets it move");
+    }
+    while !interrupt.sleep(WATCH) {
+        if let Some(hand) = &mut hand {
+            hand.listen();
+        }
+    }
     // Taking the handles down removes the links.
     drop((glove, gripper));
     Ok(())

@@ -158,8 +158,7 @@ pub(super) fn gripper_age(snapshot: &Snapshot) -> Option<f32> {
 
 /// Age of the glove's newest sample in seconds, where it is old.
 pub(super) fn glove_age(snapshot: &Snapshot) -> Option<f32> {
-    let frame = snapshot.frame.as_ref()?;
-    let newest = frame.samples.iter().map(|sample| sample.stamp).max()?;
+    let newest = snapshot.sensors?.newest;
     old(snapshot.now.checked_duration_since(newest)?.as_ticks())
 }
 
@@ -194,13 +193,10 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
 }
 
 fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
-    match &snapshot.frame {
-        Some(frame) => {
-            let sample = frame.samples.get(segment);
-            sample.is_some_and(|sample| sample.health == Health::Good)
-        }
-        // A chip does not tell.
-        None => snapshot.line.is_none(),
+    match &snapshot.sensors {
+        Some(sensors) => sensors.health.get(segment) == Some(&Health::Good),
+        // A chip of an older firmware does not tell.
+        None => snapshot.on_chip,
     }
 }
 
@@ -281,7 +277,7 @@ fn standing(snapshot: &Snapshot, hands: Hands) -> Vec<String> {
         faults.push(Kind::Calibration(Try::Waiting).to_string());
     }
     faults.extend(snapshot.unused_sensors());
-    if snapshot.line.is_none() {
+    if snapshot.on_chip {
         // Of a bridge on a chip no events come.
         let silent = |answers: bool, what: &str| (!answers).then(|| what.to_owned());
         faults.extend(silent(snapshot.glove_answers, "the glove sends no frames"));
@@ -342,7 +338,9 @@ mod tests {
             calibration: CalibrationState::default(),
             calibration_known: true,
             frame_sequence: 1,
+            on_chip: false,
             frame: None,
+            sensors: None,
             angles: [0.0; glove::hand::JOINT_COUNT],
             angles_valid: true,
             distrusted: 0,

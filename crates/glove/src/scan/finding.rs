@@ -1,7 +1,7 @@
 //! What is found out about the sensors, for a person.
 
 use crate::hand::SEGMENT_NAMES;
-use crate::{imu, mux};
+use crate::{Duration, imu, mux};
 
 /// Something the scanner found out about the sensors, told once when it begins.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +28,16 @@ pub enum Finding {
         segments: u16,
         /// How far the farthest is off, radians.
         by: f32,
+    },
+    /// These sensors are far from where they were before a gap between scans, which is the computer's or the line's doing: a hand
+    /// can have turned so far meanwhile. Several reads agree, and they are used again; the calibration stays.
+    AfterGap {
+        /// Their segments (bit k: segment k).
+        segments: u16,
+        /// How far the farthest is off, radians.
+        by: f32,
+        /// The longest gap.
+        gap: Duration,
     },
     /// By this sensor a joint is turned far beyond what a hand can ([`crate::hand::beyond`]): it is not used while it is. Found by
     /// whoever has the calibration.
@@ -69,10 +79,18 @@ impl core::fmt::Display for Finding {
                     "back after a time without samples, and turned by up to {:.0}° since:",
                     by.to_degrees()
                 )?;
-                for segment in (0..SEGMENT_NAMES.len()).filter(|k| segments >> k & 1 == 1) {
-                    write!(f, " {}", name(segment as u8))?;
-                }
+                names(f, segments)?;
                 f.write_str("; if that is not the hand's doing, calibrate again")
+            }
+            Finding::AfterGap { segments, by, gap } => {
+                write!(
+                    f,
+                    "scans came {} ms apart, too far to follow: this computer or the line is too busy; turned by up to {:.0}° meanwhile, \
+                     and followed again:",
+                    gap.as_millis(),
+                    by.to_degrees()
+                )?;
+                names(f, segments)
             }
             Finding::Impossible { segment } => write!(
                 f,
@@ -89,4 +107,15 @@ impl core::fmt::Display for Finding {
             Finding::WrongSensor { segment, error } => write!(f, "{}: {error}", name(segment)),
         }
     }
+}
+
+/// The segments of a mask, by name.
+fn names(f: &mut core::fmt::Formatter<'_>, segments: u16) -> core::fmt::Result {
+    for (_, name) in (0..)
+        .zip(SEGMENT_NAMES)
+        .filter(|(k, _)| segments >> k & 1 == 1)
+    {
+        write!(f, " {name}")?;
+    }
+    Ok(())
 }

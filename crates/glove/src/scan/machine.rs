@@ -163,9 +163,11 @@ impl<B: Bus> BusScanner<B> {
             }
             <[u8; SAMPLE_BYTES]>::try_from(sample).map_err(|_| Error::Unsupported)
         });
+        let longest = timing::scan_gap(self.config.baud, self.config.period);
         let Some(sensor) = self.sensors.get_mut(k) else {
             return;
         };
+        sensor.ask(stamp, longest);
         match sample {
             Ok(raw) => {
                 sensor.take(raw, stamp, &mut self.counters);

@@ -1,5 +1,6 @@
 //! What the scanner knows of one sensor, and how samples and failures change it.
 
+use super::suspect::{AGREE_WITHIN, Cause, Return, Suspect};
 use super::{Counters, Health, Sample};
 use crate::bus;
 use crate::hand::Quaternion;
@@ -13,30 +14,6 @@ const BAD_MAX: u8 = 3;
 
 /// Rechecks in a row without a good sample after which it is brought up again.
 const RECHECKS_MAX: u8 = 3;
-
-/// Reads in a row that must agree before a sensor is believed where no hand can have turned it: 270 ms at 115200 baud.
-const AGREEING: u8 = 10;
-
-/// How far reads that agree may be apart, and how near to the last good sample a spike must end, radians (45°): a hand at
-/// 1,600 °/s turns as far in a scan.
-const AGREE_WITHIN: f32 = core::f32::consts::FRAC_PI_4;
-
-/// A sensor that jumped as no hand does, or was away: what it has read since.
-#[derive(Debug, Clone, Copy)]
-struct Suspect {
-    read: Quaternion,
-    agreeing: u8,
-    was_away: bool,
-}
-
-/// What is told of a sensor that is believed again far from where it was.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Return {
-    /// How far off, radians.
-    pub by: f32,
-    /// It gave no samples in between: a hand can have turned so far.
-    pub was_away: bool,
-}
 
 /// One sensor.
 #[derive(Debug, Clone)]
@@ -62,6 +39,10 @@ pub(super) struct Sensor {
     good: Option<(Quaternion, Instant)>,
     /// Nobody looked at any sensor for a while, and until then it was good: it was not away.
     unseen: bool,
+    /// When it was last asked, since it came up or was checked.
+    asked: Option<Instant>,
+    /// The longest gap between two questions since the last good sample, where it was longer than a scan takes.
+    gap: Option<Duration>,
     suspect: Option<Suspect>,
     /// Good samples since it came up.
     fresh: bool,
@@ -87,6 +68,8 @@ impl Sensor {
             returned: None,
             good: None,
             unseen: false,
+            asked: None,
+            gap: None,
             suspect: None,
             fresh: false,
             up_since: Instant::from_ticks(0),
@@ -123,6 +106,29 @@ impl Sensor {
         }
     }
 
+    /// It is asked at `stamp`. More than `longest` since it was asked before: the scans have a gap.
+    pub fn ask(&mut self, stamp: Instant, longest: Duration) {
+        let pause = self.asked.replace(stamp).map(|before| since(stamp, before));
+        if let Some(pause) = pause.filter(|pause| *pause > longest) {
+            self.gap = self.gap.max(Some(pause));
+        }
+    }
+
+    /// Whether it is not believed, for what it did in a gap between scans.
+    pub fn is_suspect_of_a_gap(&self) -> bool {
+        let cause = self.suspect.map(|suspect| suspect.cause);
+        matches!(cause, Some(Cause::Gap { .. }))
+    }
+
+    /// A segment beside it turned far in the same gap: the hand moved.
+    pub fn went_along(&mut self) {
+        if let Some(Suspect { cause, .. }) = &mut self.suspect
+            && let Cause::Gap { joined, .. } = cause
+        {
+            *joined = true;
+        }
+    }
+
     /// Eight bytes arrived that were asked for at `stamp`.
     pub fn take(&mut self, raw: [u8; imu::SAMPLE_BYTES], stamp: Instant, counters: &mut Counters) {
         self.raw = Some(raw);
@@ -134,7 +140,7 @@ impl Sensor {
                     None => orientation,
                 };
                 self.good = Some((orientation, stamp));
-                (self.fresh, self.unseen) = (true, false);
+                (self.fresh, self.unseen, self.gap) = (true, false, None);
                 self.distrusted = None;
                 self.health = Health::Good;
                 (self.bad, self.rechecks, self.failures, self.tries) = (0, 0, 0, 0);
@@ -170,22 +176,15 @@ impl Sensor {
             return Ok(orientation);
         };
         let by = imu::angle_between(&good, &orientation);
-        let elapsed = since(stamp, at);
         if self.unseen && self.suspect.is_none() {
             // The hand may have done anything meanwhile.
             return Ok(orientation);
         }
-        let was_away = !self.fresh || elapsed >= timing::PEAK_SPEED;
         let Some(suspect) = self.suspect else {
-            let is_near = if was_away {
-                by <= AGREE_WITHIN
-            } else {
-                imu::is_reachable(&good, &orientation, elapsed)
-            };
-            if is_near {
+            let Some(cause) = self.doubts(by, since(stamp, at)) else {
                 return Ok(orientation);
-            }
-            let suspect = Suspect::at(orientation, was_away);
+            };
+            let suspect = Suspect::at(orientation, cause);
             self.suspect = Some(suspect);
             return Err(suspect.fault());
         };
@@ -196,13 +195,33 @@ impl Sensor {
         }
         let next = suspect.followed_by(orientation);
         self.suspect = Some(next);
-        if next.agreeing < AGREEING {
+        if !next.is_believed() {
             return Err(next.fault());
         }
         self.suspect = None;
-        let was_away = next.was_away;
-        self.returned = Some(Return { by, was_away });
+        let cause = next.cause;
+        self.returned = Some(Return { by, cause });
         Ok(orientation)
+    }
+
+    /// Why a turn `by` radians in `elapsed` since the last good sample is not believed at once, if it is not.
+    fn doubts(&self, by: f32, elapsed: Duration) -> Option<Cause> {
+        let was_away = !self.fresh || elapsed >= timing::PEAK_SPEED;
+        // A gap that takes most of the time explains it; a short one in a long absence does not.
+        let explains = |pause: &Duration| {
+            !was_away || (self.fresh && pause.as_ticks() > elapsed.as_ticks() / 2)
+        };
+        if let Some(pause) = self.gap.filter(explains) {
+            return (by > AGREE_WITHIN).then(|| Cause::Gap {
+                pause,
+                beyond: by > imu::reach_over_gap(elapsed),
+                joined: false,
+            });
+        }
+        if was_away {
+            return (by > AGREE_WITHIN).then_some(Cause::Away);
+        }
+        (by > imu::reach(elapsed)).then_some(Cause::Jump)
     }
 
     fn reject(&mut self, fault: Fault, now: Instant, counters: &mut Counters) {
@@ -273,6 +292,7 @@ impl Sensor {
     }
 
     fn recheck(&mut self, error: Error, now: Instant) {
+        self.asked = None;
         self.bad = 0;
         self.rechecks = self.rechecks.saturating_add(1);
         if self.rechecks > RECHECKS_MAX {
@@ -298,6 +318,7 @@ impl Sensor {
         self.failures = self.failures.saturating_add(1);
         (self.step, self.due) = (Some(Step::Identify), after(now, wait));
         (self.tries, self.bad, self.rechecks, self.tried) = (0, 0, 0, true);
+        self.asked = None;
         self.forget();
     }
 
@@ -357,36 +378,6 @@ impl Sensor {
         }
         self.due = after(now, timing::STEP_RETRY);
         false
-    }
-}
-
-impl Suspect {
-    fn at(read: Quaternion, was_away: bool) -> Self {
-        Self {
-            read,
-            agreeing: 1,
-            was_away,
-        }
-    }
-
-    fn fault(&self) -> Fault {
-        if self.was_away {
-            Fault::Away
-        } else {
-            Fault::TooFast
-        }
-    }
-
-    /// One more read: it agrees with the one before, or the count begins anew.
-    fn followed_by(self, read: Quaternion) -> Self {
-        if imu::angle_between(&self.read, &read) > AGREE_WITHIN {
-            return Self::at(read, self.was_away);
-        }
-        Self {
-            read,
-            agreeing: self.agreeing.saturating_add(1),
-            ..self
-        }
     }
 }
 

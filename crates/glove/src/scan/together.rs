@@ -1,9 +1,26 @@
 //! What only the sensors together tell, at the end of each scan, and what of it is worth telling a person.
 
-use super::sensor::Return;
+use super::suspect::{Cause, Return};
 use super::{BusScanner, FINDINGS_MAX, Finding};
-use crate::Instant;
+use crate::hand;
 use crate::imu::Fault;
+use crate::{Duration, Instant};
+
+/// Sensors that are told together.
+#[derive(Default)]
+struct Together {
+    /// Their segments (bit k: segment k).
+    segments: u16,
+    /// How far the farthest is off, radians.
+    by: f32,
+}
+
+impl Together {
+    fn add(&mut self, segment: usize, by: f32) {
+        self.segments |= 1 << segment;
+        self.by = if by > self.by { by } else { self.by };
+    }
+}
 
 impl<B> BusScanner<B> {
     /// Withdraws the samples of this scan that one sensor alone could not be refused for.
@@ -33,34 +50,74 @@ impl<B> BusScanner<B> {
                 self.tell(Finding::Frozen { segment: k as u8 });
             }
         }
+        self.compare_neighbours();
         self.tell_returns();
     }
 
-    /// Those that jumped are told one by one; those that were away together.
+    /// Where a segment and the one beside it turned far in a gap between scans, the hand moved, and neither sensor jumped.
+    fn compare_neighbours(&mut self) {
+        let suspects = self
+            .sensors
+            .iter()
+            .enumerate()
+            .fold(0u16, |mask, (k, sensor)| {
+                mask | u16::from(sensor.is_suspect_of_a_gap()) << k
+            });
+        let joined = (0..self.sensors.len()).fold(0u16, |mask, k| match hand::parent(k) {
+            Some(parent) if suspects >> k & suspects >> parent & 1 == 1 => {
+                mask | 1 << k | 1 << parent
+            }
+            _ => mask,
+        });
+        for (k, sensor) in self.sensors.iter_mut().enumerate() {
+            if joined >> k & 1 == 1 {
+                sensor.went_along();
+            }
+        }
+    }
+
+    /// Those that jumped are told one by one; those that were away, and those of a gap, together.
     fn tell_returns(&mut self) {
-        let (mut segments, mut farthest) = (0, 0.0);
+        let (mut away, mut after) = (Together::default(), Together::default());
+        let mut gap = Duration::from_ticks(0);
         for k in 0..self.sensors.len() {
-            let Some(Return { by, was_away }) =
+            let Some(Return { by, cause }) =
                 self.sensors.get_mut(k).and_then(|s| s.returned.take())
             else {
                 continue;
             };
-            if was_away {
-                segments |= 1 << k;
-                farthest = if by > farthest { by } else { farthest };
-            } else {
-                self.counters.jumps = self.counters.jumps.wrapping_add(1);
-                self.tell(Finding::Jumped {
-                    segment: k as u8,
-                    by,
-                });
+            match cause {
+                Cause::Away => away.add(k, by),
+                Cause::Gap {
+                    pause,
+                    beyond,
+                    joined,
+                } if joined || !beyond => {
+                    after.add(k, by);
+                    gap = gap.max(pause);
+                }
+                Cause::Jump | Cause::Gap { .. } => {
+                    self.counters.jumps = self.counters.jumps.wrapping_add(1);
+                    self.tell(Finding::Jumped {
+                        segment: k as u8,
+                        by,
+                    });
+                }
             }
         }
-        if segments != 0 {
-            self.tell(Finding::Returned {
-                segments,
-                by: farthest,
-            });
+        if let Together {
+            segments: segments @ 1..,
+            by,
+        } = away
+        {
+            self.tell(Finding::Returned { segments, by });
+        }
+        if let Together {
+            segments: segments @ 1..,
+            by,
+        } = after
+        {
+            self.tell(Finding::AfterGap { segments, by, gap });
         }
     }
 

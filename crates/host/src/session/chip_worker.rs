@@ -13,11 +13,12 @@ use bridge::protocol::message::{Counters, Sample, Status};
 
 use super::axes::Axes;
 use super::calibrating::told;
+use super::chip_devices::Told;
 use super::chip_stop::{Known, renew, stop};
 use super::hub::{Happened, Hub, Totals};
 use super::orders::{Order, Queue};
 use super::record::Sort;
-use super::snapshot::{self, Snapshot};
+use super::snapshot::Snapshot;
 use super::stopped::Stopped;
 use crate::chip::link::{Error, Heartbeat, HostLink};
 
@@ -69,6 +70,7 @@ pub(super) struct Worker {
     status: Status,
     asked_status: Instant,
     sample: Option<Sample>,
+    devices: Told,
     calibration: CalibrationState,
     /// The bridge has said so.
     calibration_known: bool,
@@ -97,6 +99,7 @@ impl Worker {
             touched: false,
             clutch: Position::Open,
             missed: 0,
+            devices: Told::new(&status),
             status,
             asked_status: now,
             sample: None,
@@ -183,9 +186,12 @@ impl Worker {
         }
         if quiet {
             self.count(begun + HEARTBEAT)?;
+            self.look_at_devices(begun + HEARTBEAT)?;
         }
         for sample in self.link.listen(LISTEN)? {
-            self.hub.lock().numbers.sample(&sample);
+            let blocked = |axis| self.devices.is_blocked(axis);
+            self.hub.lock().numbers.sample(&sample, blocked);
+            self.devices.sample(&sample);
             if let Some(samples) = &self.samples {
                 // Who keeps them and is slow, or gone, says so.
                 let _ = samples.try_send(sample.clone());
@@ -310,6 +316,22 @@ impl Worker {
         Ok(())
     }
 
+    /// Four times a second, where the answer comes by `end`.
+    fn look_at_devices(&mut self, end: Instant) -> Result<(), Error> {
+        let before = self.devices.stands();
+        if self.devices.ask(&mut self.link, end)?.is_none() {
+            return Ok(());
+        }
+        let mut said = self.hub.lock();
+        if let Some(line) = self.devices.line() {
+            said.totals.line(&line);
+        }
+        if let Some(axis) = self.devices.stands().filter(|_| before.is_none()) {
+            said.numbers.obeyed.stands(axis);
+        }
+        Ok(())
+    }
+
     fn take_counters(&mut self, counters: Counters) {
         let now = Instant::now();
         let (at, before) = std::mem::replace(&mut self.counted, (now, counters));
@@ -326,47 +348,36 @@ impl Worker {
         said.totals.count(&counters, now);
     }
 
-    pub fn say(&self) {
+    pub fn say(&mut self) {
+        self.devices.status(&self.status);
         let status = &self.status;
-        let sample = self.sample.as_ref();
-        let sample = sample.filter(|sample| sample.now_us >= status.now_us);
         let newest = self.sample.as_ref();
-        let now_us = newest.map_or(status.now_us, |sample| sample.now_us.max(status.now_us));
-        let now = gripper::Instant::from_ticks(now_us);
-        let gripper = status.gripper.as_ref().and_then(|gripper| {
-            let position = sample.map_or(&gripper.position, |sample| &sample.position);
-            Some(snapshot::Status {
-                stamp: now,
-                activation: gripper.activation,
-                fault: gripper.fault,
-                echo: Axes::new(&gripper.echo)?,
-                position: Axes::new(position).or(Axes::new(&gripper.position))?,
-                more: None,
-            })
-        });
+        let sample = newest.filter(|sample| sample.now_us >= status.now_us);
         let state = sample.map_or(status.state, |sample| sample.state);
         let mut calibration = self.calibration;
         // The newest word: under a closed clutch nothing else is asked.
         calibration.is_calibrated &= state.hold_reason() != Some(HoldReason::NotCalibrated);
         let seen = Snapshot {
-            now,
+            now: self.devices.now(),
             state,
             clutch: self.clutch,
             calibration,
             calibration_known: self.calibration_known,
             frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
+            on_chip: true,
             frame: None,
+            sensors: self.devices.sensors(),
             angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),
             angles_valid: status.glove_answers && !self.useless,
-            distrusted: 0,
-            impossible: 0,
+            distrusted: self.devices.distrusted(),
+            impossible: self.devices.impossible(),
             command: newest.and_then(|sample| Axes::new(&sample.command)),
             sent: None,
-            gripper_answers: gripper.is_some(),
-            status: gripper,
-            stands: None,
+            gripper_answers: status.gripper.is_some(),
+            status: self.devices.gripper(),
+            stands: self.devices.stands(),
             glove_answers: status.glove_answers,
-            line: None,
+            line: self.devices.line(),
             late_steps: self.counted.1.late_steps,
         };
         self.hub.lock().say(seen, self.useless);

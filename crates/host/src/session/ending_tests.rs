@@ -5,6 +5,7 @@ use gripper::Activation;
 
 use super::super::driven::Moment;
 use super::*;
+use crate::lines::{Model, Settings};
 
 const BUSY: &str = "real-time priority";
 
@@ -68,11 +69,23 @@ fn attended() -> Driver {
     }
 }
 
-/// What was told, with its next step; exit code 1.
+/// What was told, with its next steps for devices here and on a chip; exit code 1.
 fn told(ending: Ending) -> Option<(String, String)> {
-    let failure = ending.judge().err()?.downcast::<Failure>().unwrap();
-    assert_eq!(failure.exit_code(), 1);
-    Some((failure.to_string(), failure.next_step().to_owned()))
+    let here = Devices::Here {
+        glove: "/dev/ttyUSB0".into(),
+        gripper: "/dev/ttyUSB1".into(),
+        model: Model::ThreeFinger,
+        settings: Settings::default(),
+    };
+    let chip = Devices::Chip("/dev/ttyACM0".parse().expect("an address"));
+    let [on_pc, on_chip] = [here, chip].map(|devices| {
+        let failure = ending.clone().judge(&devices).err()?;
+        let failure = failure.downcast::<Failure>().unwrap();
+        assert_eq!(failure.exit_code(), 1);
+        Some((failure.to_string(), failure.next_step()))
+    });
+    let (what, here) = on_pc?;
+    Some((what, format!("{here} | {}", on_chip?.1)))
 }
 
 fn names(ending: Ending, reason: HoldReason, word: &str) {

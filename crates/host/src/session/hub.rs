@@ -12,12 +12,14 @@ use bridge::event::Kind;
 use bridge::protocol::message;
 use bridge::telemetry::Counters;
 use bridge::{HoldReason, State};
+use gripper::link;
 
 use super::driven::{Driven, Moment};
 use super::ending::{Driver, Ending};
 use super::lasting::Lasting;
 use super::numbers::{Numbers, Progress};
 use super::record::Sort;
+use super::replies::Failed;
 use super::snapshot::Snapshot;
 use super::summary::Summary;
 use crate::realtime::Scheduling;
@@ -52,6 +54,8 @@ pub(super) enum Totals {
     OnChip {
         before: (message::Counters, Instant),
         newest: (message::Counters, Instant),
+        /// The gripper's line at the same two times, where the chip tells.
+        line: Option<[link::Counters; 2]>,
     },
 }
 
@@ -62,6 +66,7 @@ impl Totals {
         Self::OnChip {
             before,
             newest: before,
+            line: None,
         }
     }
 
@@ -72,9 +77,23 @@ impl Totals {
         }
     }
 
+    /// The same of its gripper's line.
+    pub fn line(&mut self, counters: &link::Counters) {
+        if let Self::OnChip { line, .. } = self {
+            let [before, _] = line.unwrap_or([*counters; 2]);
+            *line = Some([before, *counters]);
+        }
+    }
+
     fn begin(&mut self) {
-        if let Self::OnChip { before, newest } = self {
+        if let Self::OnChip {
+            before,
+            newest,
+            line,
+        } = self
+        {
             *before = *newest;
+            *line = line.map(|[_, now]| [now; 2]);
         }
     }
 }
@@ -116,9 +135,16 @@ impl Said {
         match &self.totals {
             Totals::None => summary,
             Totals::InProcess(counters, scheduling) => summary.with(counters, *scheduling),
-            Totals::OnChip { before, newest } => {
+            Totals::OnChip {
+                before,
+                newest,
+                line,
+            } => {
                 let time = newest.1.saturating_duration_since(before.1);
-                summary.on_chip(&newest.0.since(&before.0), time)
+                Summary {
+                    gripper_failed: line.map(|[before, now]| Failed::between(&before, &now)),
+                    ..summary.on_chip(&newest.0.since(&before.0), time)
+                }
             }
         }
     }
@@ -223,6 +249,7 @@ impl Hub {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::Devices;
     use bridge::calibration::Try;
     use bridge::clutch::Position;
 
@@ -243,7 +270,7 @@ mod tests {
             closed: true,
             ..Driver::default()
         };
-        hub.ending(driver).unwrap().judge()
+        hub.ending(driver).unwrap().judge(&Devices::Unknown)
     }
 
     #[test]

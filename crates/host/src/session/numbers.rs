@@ -100,8 +100,8 @@ impl Numbers {
         }
     }
 
-    /// Counts in a telemetry sample of a bridge on a chip.
-    pub fn sample(&mut self, sample: &Sample) {
+    /// Counts in a telemetry sample of a bridge on a chip. `blocked`: whether an axis says that something is in its way.
+    pub fn sample(&mut self, sample: &Sample, blocked: impl Fn(usize) -> bool) {
         let now_us = sample.now_us;
         let last = self.last_sequence.replace(sample.frame_sequence);
         let fresh = last.map_or(0, |last| sample.frame_sequence.wrapping_sub(last));
@@ -113,9 +113,8 @@ impl Numbers {
         if !self.following {
             return;
         }
-        // What is in an axis' way is not told on this wire.
         self.obeyed
-            .look(now_us, &sample.command, &sample.position, |_| false);
+            .look(now_us, &sample.command, &sample.position, blocked);
         if let Some(us) = sample.latency_us {
             self.latency.add(us.into());
         }

@@ -1,7 +1,8 @@
 //! The bridge on a chip: a conversation over the host protocol on a thread of its own.
 //!
-//! A heartbeat is asked once and nothing else is waited for between two of them; what the chip counts is asked for in the
-//! pause behind one. What it does not tell (its sensors one by one, its events) is absent from what is said at the hub.
+//! A heartbeat is asked once and nothing else is waited for between two of them; what the chip counts, and how its sensors and
+//! its gripper are, is asked for in the pause behind one. What it does not tell (its events) is absent from what is said at
+//! the hub.
 
 use std::sync::mpsc::SyncSender;
 use std::thread::JoinHandle;

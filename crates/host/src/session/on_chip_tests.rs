@@ -8,7 +8,7 @@ use bridge::protocol::message::Refusal;
 use bridge::{HoldReason, State};
 
 use super::scripted::Scripted;
-use super::{Driver, OnChip, Order, Session, Snapshot, Stopped};
+use super::{Devices, Driver, OnChip, Order, Session, Snapshot, Stopped};
 use crate::chip::link::HostLink;
 use crate::clock::Clock;
 
@@ -66,7 +66,7 @@ fn a_wire_that_is_cut_under_a_closed_clutch_leaves_nothing_that_is_called_held()
     until_over(&session);
     let stopped = session.stop().unwrap();
     assert_eq!(stopped, Stopped::Unheard);
-    assert!(stopped.judge().is_err());
+    assert!(stopped.judge(&Devices::Unknown).is_err());
 }
 
 #[test]
@@ -93,7 +93,7 @@ fn a_bridge_that_restarted_under_a_closed_clutch_is_told_as_restarted() {
     assert_eq!(stopped, Stopped::Restarted);
     assert!(
         stopped
-            .judge()
+            .judge(&Devices::Unknown)
             .unwrap_err()
             .to_string()
             .contains("restarted")
@@ -203,6 +203,6 @@ fn a_bridge_that_was_held_all_the_time_makes_a_run_that_has_failed() {
         ..Driver::default()
     };
     let ending = session.hub().ending(driver).unwrap();
-    let told = ending.judge().unwrap_err().to_string();
+    let told = ending.judge(&Devices::Unknown).unwrap_err().to_string();
     assert!(told.contains("never followed"), "{told}");
 }

@@ -3,7 +3,7 @@
 use bridge::calibration::CalibrationState;
 use bridge::clutch::Position;
 use bridge::{State, Telemetry};
-use glove::hand::JOINT_COUNT;
+use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan;
 use gripper::{Activation, Contact, Fault, Instant};
 
@@ -34,7 +34,7 @@ impl<const X: usize> From<gripper::Motion<X>> for Motion {
 /// What the gripper said about itself in one reply.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Status {
-    /// When it was asked for, or, of a bridge on a chip, when that told it.
+    /// When it was asked for; of a bridge on a chip as near as that tells.
     pub stamp: Instant,
     /// Whether it can move.
     pub activation: Activation,
@@ -44,11 +44,11 @@ pub struct Status {
     pub echo: Axes<u8>,
     /// Where each axis is, counts.
     pub position: Axes<u8>,
-    /// What a bridge in this process knows besides.
+    /// What it says of its axes; not known from a bridge on a chip whose firmware is older than that question.
     pub more: Option<More>,
 }
 
-/// What the host protocol does not carry of a status.
+/// What the gripper says of its axes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct More {
     /// Whether it follows the positions asked for (gGTO).
@@ -98,8 +98,12 @@ pub struct Snapshot {
     pub calibration_known: bool,
     /// Counts frames taken; 0: none yet.
     pub frame_sequence: u32,
-    /// The newest frame's sensors.
+    /// Whether the bridge runs on a chip, of which no events come.
+    pub on_chip: bool,
+    /// The newest frame; of a bridge in this process only.
     pub frame: Option<scan::Frame>,
+    /// How its sensors are; `None` before the first frame, and from a chip whose firmware does not tell.
+    pub sensors: Option<Sensors>,
     /// Joint angles, radians.
     pub angles: [f32; JOINT_COUNT],
     /// Whether the newest frame gave angles.
@@ -126,6 +130,25 @@ pub struct Snapshot {
     pub late_steps: u32,
 }
 
+/// The glove's sensors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sensors {
+    /// How each is, by segment.
+    pub health: [scan::Health; SEGMENT_COUNT],
+    /// When the newest good sample of any was asked for.
+    pub newest: Instant,
+}
+
+impl From<&scan::Frame> for Sensors {
+    fn from(frame: &scan::Frame) -> Self {
+        let newest = frame.samples.iter().map(|sample| sample.stamp).max();
+        Self {
+            health: frame.samples.map(|sample| sample.health),
+            newest: newest.unwrap_or(Instant::from_ticks(0)),
+        }
+    }
+}
+
 /// The newest command that left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sent {
@@ -144,7 +167,9 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
             calibration: now.calibration,
             calibration_known: true,
             frame_sequence: now.frame_sequence,
+            on_chip: false,
             frame: now.frame,
+            sensors: now.frame.as_ref().map(Sensors::from),
             angles: now.angles,
             angles_valid: now.angles_valid,
             distrusted: now.distrusted,
@@ -175,7 +200,9 @@ impl Snapshot {
             calibration: CalibrationState::default(),
             calibration_known: true,
             frame_sequence: 1,
+            on_chip: false,
             frame: None,
+            sensors: None,
             angles: [0.0; JOINT_COUNT],
             angles_valid: true,
             distrusted: 0,
@@ -201,9 +228,8 @@ impl Snapshot {
     /// The sensors that are not used, by name, with what is wrong with them.
     pub fn unused_sensors(&self) -> Vec<String> {
         let mut unused = Vec::new();
-        if let Some(frame) = &self.frame {
-            let health = frame.samples.map(|sample| sample.health);
-            unused.extend(words::lost_sensors(&health));
+        if let Some(sensors) = &self.sensors {
+            unused.extend(words::lost_sensors(&sensors.health));
         }
         unused.extend(words::distrusted_sensors(self.distrusted));
         unused.extend(words::impossible_sensors(self.impossible));
@@ -212,7 +238,7 @@ impl Snapshot {
 
     /// Why the newest frames could not be used.
     pub fn why_useless(&self) -> String {
-        if self.frame.is_none() {
+        if self.sensors.is_none() {
             let told = self.state.hold_reason().map(|reason| reason.to_string());
             return told.unwrap_or_else(|| {
                 "sensors are lost, frozen or give what is no orientation".to_owned()

@@ -52,7 +52,7 @@ pub struct Summary {
     pub gripper_faults: u32,
     /// What went wrong last, whatever it was. In this process only.
     pub last_fault: Option<String>,
-    /// Of the requests to the gripper that failed, what came instead of the right answer. In this process only.
+    /// Of the requests to the gripper that failed, what came instead of the right answer; `None` where a chip does not tell.
     pub gripper_failed: Option<Failed>,
     /// Steps of the supervisor.
     pub steps: u32,

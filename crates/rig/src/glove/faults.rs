@@ -25,6 +25,11 @@ impl VirtualGlove {
         self.sensor(index, |chip| chip.exchange(built_as));
     }
 
+    /// Asks the hand to lie flat until it is asked to move again; a hand that only plays its motion does not.
+    pub fn lie_flat(&self, flat: bool) {
+        lock(&self.state).hand.pose.lie_flat(flat);
+    }
+
     /// Takes sensor `index` off the bus (every access is a NACK), or puts it back as it was.
     pub fn unplug(&self, index: usize, unplugged: bool) {
         self.sensor(index, |chip| chip.faults.unplugged = unplugged);

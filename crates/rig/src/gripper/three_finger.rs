@@ -17,8 +17,6 @@ const INDIVIDUAL_SCISSOR: (f32, f32) = (16.0, 239.0);
 const SPEED: (f32, f32) = (36.2, 181.0);
 /// Motor current while closing and while opening, 10 mA a count, from the manual's examples.
 const CURRENT: [(u8, u8); 4] = [(15, 11), (16, 14), (15, 11), (12, 12)];
-/// A re-activation without a power cut calibrates nothing and moves nothing (assumed); its ticks.
-const REACTIVATION_TICKS: u32 = 100;
 /// An axis barred by another for this many ticks is an interference (assumed).
 const INTERFERENCE_TICKS: u32 = 40;
 /// 20 s of it make a major fault.
@@ -44,9 +42,6 @@ enum State {
     Reset,
     Closing,
     Opening,
-    Reactivating {
-        ticks: u32,
-    },
     ChangingMode,
     Ready,
     Releasing,
@@ -62,7 +57,6 @@ pub(super) struct ThreeFinger {
     mode: u8,
     individual_scissor: bool,
     going: bool,
-    was_activated: bool,
     echo: [u8; 4],
     fault: u8,
     pub injected: Option<u8>,
@@ -113,7 +107,6 @@ impl ThreeFinger {
             mode: 0,
             individual_scissor: false,
             going: false,
-            was_activated: false,
             echo: [0; 4],
             fault: 0,
             injected: None,
@@ -129,7 +122,7 @@ impl ThreeFinger {
             return;
         }
         if self.state == State::Reset {
-            self.begin_activation();
+            self.state = State::Closing;
         }
         if self.injected.is_some_and(|code| code >= fault::ACTIVATION) {
             self.state = State::Failed;
@@ -140,7 +133,7 @@ impl ThreeFinger {
         }
         match self.state {
             State::Reset | State::Failed => self.axes.iter_mut().for_each(Axis::halt),
-            State::Closing | State::Opening | State::Reactivating { .. } => {
+            State::Closing | State::Opening => {
                 self.fault = if command.go { fault::ACTIVATE_FIRST } else { 0 };
                 self.activate(seconds);
             }
@@ -155,7 +148,6 @@ impl ThreeFinger {
 
     /// Activated without the motion that belongs to it.
     pub fn preset_active(&mut self) {
-        self.was_activated = true;
         self.ready();
     }
 
@@ -164,7 +156,7 @@ impl ThreeFinger {
         let imc: u8 = match self.state {
             State::Reset | State::Releasing => 0,
             State::Failed if self.fault == fault::RELEASED => 0,
-            State::Closing | State::Opening | State::Reactivating { .. } => 1,
+            State::Closing | State::Opening => 1,
             State::ChangingMode => 2,
             State::Ready | State::Failed => 3,
         };
@@ -235,22 +227,10 @@ impl ThreeFinger {
         }
     }
 
-    fn begin_activation(&mut self) {
-        self.state = if self.was_activated {
-            State::Reactivating {
-                ticks: REACTIVATION_TICKS,
-            }
-        } else {
-            State::Closing
-        };
-    }
-
-    /// The first activation closes and opens the fingers and centres the scissor.
+    /// Every activation, one after a reset, too, closes and opens the fingers and centres the scissor.
     fn activate(&mut self, seconds: f32) {
         let state = self.state;
         match state {
-            State::Reactivating { ticks: 0 } => self.ready(),
-            State::Reactivating { ticks } => self.state = State::Reactivating { ticks: ticks - 1 },
             State::Closing
                 if self.sweep([249.0, 249.0, 249.0, NEUTRAL_SCISSOR], SPEED.1, seconds) =>
             {
@@ -259,7 +239,6 @@ impl ThreeFinger {
             }
             State::Opening if self.sweep([0.0, 0.0, 0.0, NEUTRAL_SCISSOR], SPEED.1, seconds) => {
                 self.mode = 0;
-                self.was_activated = true;
                 self.ready();
             }
             _ => {}

@@ -36,7 +36,7 @@ impl Poses {
         let writer = std::thread::Builder::new()
             .spawn(move || {
                 let mut rows = 0;
-                let written = write(file, &samples, &mut rows);
+                let written = write(file, &samples, &mut rows).and_then(|file| file.sync_all());
                 if written.is_err() {
                     interrupt.ask();
                 }
@@ -67,17 +67,23 @@ impl Poses {
     }
 }
 
-fn write(file: File, samples: &Receiver<Sample>, rows: &mut u64) -> std::io::Result<()> {
-    let mut file = BufWriter::new(file);
+/// The poses of `samples`. A frame of which a row was written already, and one that gave no angles (the bridge repeats its last
+/// ones then, to the bit), are no new pose.
+fn write<W: Write>(to: W, samples: &Receiver<Sample>, rows: &mut u64) -> std::io::Result<W> {
+    let mut file = BufWriter::new(to);
     write!(file, "time_s")?;
     for name in glove::hand::JOINT_NAMES {
         write!(file, ",{name}")?;
     }
     writeln!(file)?;
-    let mut last_frame = 0;
+    // Before the first frame there is no pose.
+    let (mut last_frame, mut last) = (0, None);
     for sample in samples {
-        // The same frame twice is no new pose; before the first frame there is none.
         if std::mem::replace(&mut last_frame, sample.frame_sequence) == sample.frame_sequence {
+            continue;
+        }
+        let angles = sample.angles.map(f32::to_bits);
+        if last.replace(angles) == Some(angles) {
             continue;
         }
         write!(file, "{:.6}", sample.now_us as f64 / 1e6)?;
@@ -88,6 +94,47 @@ fn write(file: File, samples: &Receiver<Sample>, rows: &mut u64) -> std::io::Res
         *rows += 1;
     }
     file.into_inner()
-        .map_err(std::io::IntoInnerError::into_error)?
-        .sync_all()
+        .map_err(std::io::IntoInnerError::into_error)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bridge::State;
+    use glove::hand::JOINT_COUNT;
+
+    #[test]
+    fn a_frame_that_gave_no_angles_is_no_row_of_old_ones() {
+        let sample = |frame_sequence, angle| Sample {
+            now_us: 40_000 * u64::from(frame_sequence),
+            state: State::Idle,
+            frame_sequence,
+            angles: [angle; JOINT_COUNT],
+            target: Default::default(),
+            command: Default::default(),
+            position: Default::default(),
+            latency_us: None,
+        };
+        let (sender, samples) = sync_channel(QUEUE);
+        for (sequence, angle) in [
+            (0, 0.0),
+            (1, 0.25),
+            (1, 0.25),
+            (2, 0.25),
+            (3, 0.25),
+            (4, 0.5),
+        ] {
+            sender.try_send(sample(sequence, angle)).expect("room");
+        }
+        drop(sender);
+        let mut rows = 0;
+        let bytes = write(Vec::new(), &samples, &mut rows).expect("memory takes all");
+        let text = String::from_utf8(bytes).expect("text");
+        let times: Vec<&str> = text
+            .lines()
+            .skip(1)
+            .filter_map(|row| row.split(',').next())
+            .collect();
+        assert_eq!((rows, times), (2, vec!["0.040000", "0.160000"]));
+    }
 }

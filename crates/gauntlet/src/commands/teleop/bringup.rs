@@ -94,7 +94,7 @@ pub(super) fn prepare(
 /// Names the sensors that did not come up, as `doctor` does: their joints are held.
 fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
     let all = |health: &[Health; SEGMENT_COUNT]| health.iter().all(|health| health.is_good());
-    let health = |seen: &Snapshot| seen.frame.map(|frame| frame.samples.map(|s| s.health));
+    let health = |seen: &Snapshot| seen.sensors.map(|sensors| sensors.health);
     run.wait(STRAGGLERS, |seen| health(seen).is_some_and(|h| all(&h)))?;
     // One that is still being brought up says soon what it fails with.
     run.wait(2 * STRAGGLERS, |seen| {

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use bridge::clutch::HeartbeatRefusal;
-use bridge::protocol::message::{Answer, Call, Counters, Refusal, Status};
+use bridge::protocol::message::{Answer, Call, Counters, Devices, Refusal, Status};
 
 use super::{Epoch, Error, HostLink, as_status, confused};
 
@@ -65,14 +65,34 @@ impl HostLink {
     /// # Errors
     /// The line's fault, or the bridge's refusal.
     pub fn counters_by(&mut self, end: Instant) -> Result<Option<Counters>, Error> {
+        match self.ask_by(&Call::Counters, end)? {
+            Some(Some(Answer::Counters(counters))) => Ok(Some(counters)),
+            Some(Some(other)) => Err(confused(&other)),
+            Some(None) | None => Ok(None),
+        }
+    }
+
+    /// How its glove and gripper are, asked once: `None` where no answer can come by `end`, `Some(None)` where none came.
+    ///
+    /// # Errors
+    /// As [`HostLink::counters_by`].
+    pub fn devices_by(&mut self, end: Instant) -> Result<Option<Option<Devices>>, Error> {
+        match self.ask_by(&Call::Devices, end)? {
+            Some(Some(Answer::Devices(devices))) => Ok(Some(Some(devices))),
+            Some(Some(other)) => Err(confused(&other)),
+            Some(None) => Ok(Some(None)),
+            None => Ok(None),
+        }
+    }
+
+    fn ask_by(&mut self, call: &Call<'_>, end: Instant) -> Result<Option<Option<Answer>>, Error> {
         let wait = end.saturating_duration_since(Instant::now());
         if wait < LEAST_WAIT {
             return Ok(None);
         }
-        match self.ask(&Call::Counters, wait, 1) {
-            Ok(Answer::Counters(counters)) => Ok(Some(counters)),
-            Ok(other) => Err(confused(&other)),
-            Err(Error::Silent { .. }) => Ok(None),
+        match self.ask(call, wait, 1) {
+            Ok(answer) => Ok(Some(Some(answer))),
+            Err(Error::Silent { .. }) => Ok(Some(None)),
             Err(error) => Err(error),
         }
     }
