@@ -1,0 +1,160 @@
+//! The end of a session: profile, headings, checks.
+
+use super::algebra::{self, between, up_in};
+use super::solve::{self, Geometry, is_base, is_thumb};
+use super::{Checks, Profile, Session, Side};
+use crate::hand::{self, Quaternion, SEGMENT_COUNT};
+
+/// What a session gave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Outcome {
+    /// The glove on this hand.
+    pub profile: Profile,
+    /// By segment, against the hand's, radians: of the turn.
+    pub headings: [f32; SEGMENT_COUNT],
+    /// Mean orientation of each segment's sensor in the last flat pose: what the headings are brought up to date with.
+    pub last_flat: [Quaternion; SEGMENT_COUNT],
+    /// What speaks for and against it.
+    pub checks: Checks,
+}
+
+/// Why there is no outcome.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Unfinished {
+    /// The hand was not turned.
+    NoTurn,
+    /// No flat pose before the turn, or after the bending.
+    NoFlat,
+    /// Steps passed without a sample of this sensor, as it is wired.
+    NoSamples {
+        /// The sensor.
+        sensor: u8,
+    },
+}
+
+impl core::fmt::Display for Unfinished {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        match self {
+            Unfinished::NoTurn => f.write_str("the hand was not turned"),
+            Unfinished::NoFlat => f.write_str("a flat pose is missing"),
+            Unfinished::NoSamples { sensor } => {
+                write!(
+                    f,
+                    "no samples of sensor {sensor} in a flat pose or the turn"
+                )
+            }
+        }
+    }
+}
+
+impl core::error::Error for Unfinished {}
+
+impl Session {
+    /// Ends the step under way: what the session gave. It can go on after that.
+    ///
+    /// # Errors
+    /// [`Unfinished`] names what is missing.
+    pub fn finish(&mut self) -> Result<Outcome, Unfinished> {
+        self.end();
+        let by_sensor = self.headings.ok_or(Unfinished::NoTurn)?;
+        let (before, last) = self.flats.split_at(2);
+        if self.flats_made & 0b011 == 0 || self.flats_made & 0b100 == 0 {
+            return Err(Unfinished::NoFlat);
+        }
+        let mut last_flat = [Quaternion::identity(); SEGMENT_COUNT];
+        for k in 0..SEGMENT_COUNT {
+            let sensor = self.seats[k];
+            let seen = self.turn.heading(usize::from(sensor)).is_some()
+                && before.iter().any(|f| f.mean(usize::from(sensor)).is_some());
+            let missing = Unfinished::NoSamples { sensor };
+            let mean = last.iter().find_map(|f| f.mean(usize::from(sensor)));
+            last_flat[k] = mean.filter(|_| seen).ok_or(missing)?;
+        }
+        let of_hand = by_sensor[usize::from(self.seats[0])];
+        let headings = self
+            .seats
+            .map(|sensor| algebra::wrap(by_sensor[usize::from(sensor)] - of_hand));
+        let moments = self.moments();
+        let solve = |flats| solve::geometry(flats, &self.seats, &headings, &moments);
+        let missing = Unfinished::NoSamples { sensor: 0 };
+        let early = solve(before).ok_or(missing)?;
+        let all = solve(&self.flats).ok_or(missing)?;
+        let checks = self.checks(&early, &all, &headings, &last_flat);
+        let thumb_base = all.thumb_base();
+        let (mounting, axes) = all.with_thumb(&thumb_base);
+        let side = if checks.x_up < 0.0 {
+            Side::Left
+        } else {
+            Side::Right
+        };
+        Ok(Outcome {
+            profile: Profile {
+                side,
+                sensors: self.seats,
+                mounting,
+                axes,
+                thumb_base,
+            },
+            headings,
+            last_flat,
+            checks,
+        })
+    }
+
+    /// `early`: by the flat poses before the last.
+    fn checks(
+        &self,
+        early: &Geometry,
+        all: &Geometry,
+        headings: &[f32; SEGMENT_COUNT],
+        last: &[Quaternion; SEGMENT_COUNT],
+    ) -> Checks {
+        let of = |segment: usize| self.turn.heading(usize::from(self.seats[segment]));
+        let fit = core::array::from_fn(|k| of(k).map_or(f32::NAN, |found| found.fit));
+        let ratio = core::array::from_fn(|k| of(k).map_or(f32::NAN, |found| found.ratio));
+        // The hand's x in the frame of sensor 0, wherever that sits.
+        let on = self
+            .seats
+            .iter()
+            .position(|&sensor| sensor == 0)
+            .unwrap_or(0);
+        let x = algebra::rotate(&all.mounting[on].inverse(), algebra::X);
+        let mut checks = Checks {
+            identity: self.identity(),
+            fit,
+            ratio,
+            x_up: self.turn.farthest_up(x),
+            thumb_y: all.axes[2][1],
+            motion: all.motion,
+            lean: all.lean,
+            tilt: [0.0; SEGMENT_COUNT],
+            innovation: [0.0; SEGMENT_COUNT],
+            flat_angle: [0.0; SEGMENT_COUNT],
+            restarted: self.restarted,
+        };
+        let segments: [Quaternion; SEGMENT_COUNT] = core::array::from_fn(|k| {
+            let turned = algebra::turned_back(algebra::half(headings[k]), &last[k]);
+            turned * early.mounting[k].inverse()
+        });
+        for k in 1..SEGMENT_COUNT {
+            let parent = &segments[hand::parent(k).unwrap_or(0)];
+            let relative = segments[k] * parent.inverse();
+            checks.tilt[k] = between(up_in(&segments[k]), algebra::Y);
+            checks.innovation[k] = libm::fabsf(algebra::about_up(relative.w, relative.k));
+            if !is_thumb(k) {
+                checks.flat_angle[k] = largest_angle(k, parent, &segments[k], early);
+            }
+        }
+        checks
+    }
+}
+
+/// The largest angle of the joint between a finger's segment and its parent.
+fn largest_angle(k: usize, parent: &Quaternion, child: &Quaternion, geometry: &Geometry) -> f32 {
+    let relative = parent.inverse() * child;
+    if !is_base(k) {
+        return libm::fabsf(hand::rotation::twist_about(&relative, geometry.axes[k]));
+    }
+    let angles = hand::rotation::decompose(&relative).map(libm::fabsf);
+    angles.into_iter().fold(0.0, f32::max)
+}
