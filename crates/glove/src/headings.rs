@@ -139,7 +139,8 @@ pub struct Headings {
 }
 
 impl Headings {
-    /// No heading known: everything is held until a flat pose is asked for ([`Headings::begin_flat`]).
+    /// No heading known. Hinges that can be seen come by themselves in half a second; the joints on the hand are held until a
+    /// flat pose ([`Headings::begin_flat`], or one that is found).
     pub fn new(profile: &Profile, config: Config) -> Self {
         let unmount = profile.mounting.map(|m| m.inverse());
         let axes = core::array::from_fn(|k| {
@@ -392,8 +393,7 @@ impl Headings {
             pose.add(segments, &self.profile.thumb_base, shown, good);
             return None;
         }
-        // A hand of which nothing is known is not judged by itself: its person is asked.
-        if !self.config.finds_flat || self.unknown() == 0xFFFE {
+        if !self.config.finds_flat {
             return None;
         }
         let pose = self.finder.take(&Seen {

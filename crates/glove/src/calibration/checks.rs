@@ -19,10 +19,10 @@ pub const LEAN: f32 = rad(20.0);
 /// Largest angle of a finger joint in the last flat pose, radians (8°; correct gloves up to 5.4°).
 pub const FLAT_ANGLE: f32 = rad(8.0);
 
-/// How far a segment may be tilted in a later flat pose, radians: 9° proximal and middle, 10° distal, 14° the thumb's.
+/// How far a segment may be tilted in a later flat pose, radians: 9° the hand, proximal and middle, 10° distal, 14° the thumb's.
 pub const fn tilt_limit(segment: usize) -> f32 {
     match segment {
-        0 => rad(90.0),
+        0 => rad(9.0),
         1..=3 => rad(14.0),
         s if s % 3 == 0 => rad(10.0),
         _ => rad(9.0),
@@ -33,6 +33,7 @@ pub const fn tilt_limit(segment: usize) -> f32 {
 /// 10° at the thumb's CMC.
 pub const fn innovation_limit(segment: usize) -> f32 {
     match segment {
+        0 => rad(4.0),
         1 => rad(10.0),
         s if s % 3 == 1 => rad(6.0),
         _ => rad(4.0),
@@ -58,7 +59,7 @@ pub struct Checks {
     pub lean: [f32; SEGMENT_COUNT],
     /// How far each segment was tilted in the last flat pose, by the poses before.
     pub tilt: [f32; SEGMENT_COUNT],
-    /// How far each heading was off in the last flat pose.
+    /// How far the heading of each segment against its parent was off in the last flat pose, with its sign.
     pub innovation: [f32; SEGMENT_COUNT],
     /// The largest angle of each finger joint in the last flat pose.
     pub flat_angle: [f32; SEGMENT_COUNT],
@@ -211,11 +212,16 @@ impl Checks {
             }),
             _ => None,
         };
-        if k == 0 {
-            return [elsewhere, None, None, None, None, None, None, None];
-        }
         let over = |value: f32, limit: f32| value > limit || value.is_nan();
+        let tilted = over(self.tilt[k], tilt_limit(k)).then_some(Doubt::Tilted {
+            segment,
+            by: self.tilt[k],
+        });
+        if k == 0 {
+            return [elsewhere, tilted, None, None, None, None, None, None];
+        }
         let (ratio, by) = (self.ratio[k], self.lean[k]);
+        let turned = libm::fabsf(self.innovation[k]);
         let hinge_stood = !is_base(k) && self.motion[k] < solve::MOVED;
         [
             elsewhere,
@@ -226,13 +232,10 @@ impl Checks {
             }),
             hinge_stood.then_some(Doubt::NotBent { segment }),
             (!is_thumb(k) && over(by, LEAN)).then_some(Doubt::Leans { segment, by }),
-            over(self.tilt[k], tilt_limit(k)).then_some(Doubt::Tilted {
+            tilted,
+            over(turned, innovation_limit(k)).then_some(Doubt::Turned {
                 segment,
-                by: self.tilt[k],
-            }),
-            over(self.innovation[k], innovation_limit(k)).then_some(Doubt::Turned {
-                segment,
-                by: self.innovation[k],
+                by: turned,
             }),
             (!is_thumb(k) && over(self.flat_angle[k], FLAT_ANGLE)).then_some(Doubt::NotFlat {
                 segment,
@@ -248,7 +251,7 @@ impl Checks {
             .filter(|doubt| match doubt.segment() {
                 None => true,
                 // What is wrong with a sensor costs the joints on both sides of it.
-                Some(at) => at == segment || (Some(at) == parent && at != 0),
+                Some(at) => at == segment || Some(at) == parent,
             })
             .map(|doubt| doubt.verdict())
             .max()
@@ -261,16 +264,38 @@ impl Checks {
         verdicts.max().unwrap_or(Verdict::Good)
     }
 
-    /// The segment whose sensor slipped, if one did: where the last flat pose is farthest beyond its limits.
+    /// The segment whose sensor slipped most, if one did: by its tilt, else by its heading, in the last flat pose.
     pub fn slipped(&self) -> Option<usize> {
-        let excess = |k: usize| {
-            let tilt = self.tilt[k] / tilt_limit(k);
-            let turn = self.innovation[k] / innovation_limit(k);
-            if tilt > turn { tilt } else { turn }
+        let farthest = |excess: [f32; SEGMENT_COUNT]| {
+            (0..SEGMENT_COUNT)
+                .max_by(|&a, &b| excess[a].total_cmp(&excess[b]))
+                .filter(|&k| excess[k] > 1.0)
         };
-        (1..SEGMENT_COUNT)
-            .max_by(|&a, &b| excess(a).total_cmp(&excess(b)))
-            .filter(|&k| excess(k) > 1.0)
+        let tilted = core::array::from_fn(|k| self.tilt[k] / tilt_limit(k));
+        farthest(tilted).or_else(|| farthest(self.turned()))
+    }
+
+    /// How far each sensor was turned about the vertical, in parts of its limit.
+    fn turned(&self) -> [f32; SEGMENT_COUNT] {
+        let mut against_hand = [0.0; SEGMENT_COUNT];
+        for k in 1..SEGMENT_COUNT {
+            let parent = crate::hand::parent(k).unwrap_or(0);
+            against_hand[k] = against_hand[parent] + self.innovation[k];
+        }
+        // Where most of the others are off alike it is the hand's sensor.
+        let mut sorted = against_hand;
+        if let Some((_, others)) = sorted.split_first_mut() {
+            others.sort_unstable_by(f32::total_cmp);
+        }
+        let common = sorted[SEGMENT_COUNT / 2];
+        core::array::from_fn(|k| {
+            let off = if k == 0 {
+                common
+            } else {
+                against_hand[k] - common
+            };
+            libm::fabsf(off) / innovation_limit(k)
+        })
     }
 }
 

@@ -136,11 +136,12 @@ impl Session {
             let turned = algebra::turned_back(algebra::half(headings[k]), &last[k]);
             turned * early.mounting[k].inverse()
         });
+        checks.tilt[0] = between(up_in(&segments[0]), algebra::Y);
         for k in 1..SEGMENT_COUNT {
             let parent = &segments[hand::parent(k).unwrap_or(0)];
             let relative = segments[k] * parent.inverse();
             checks.tilt[k] = between(up_in(&segments[k]), algebra::Y);
-            checks.innovation[k] = libm::fabsf(algebra::about_up(relative.w, relative.k));
+            checks.innovation[k] = algebra::about_up(relative.w, relative.k);
             if !is_thumb(k) {
                 checks.flat_angle[k] = largest_angle(k, parent, &segments[k], early);
             }

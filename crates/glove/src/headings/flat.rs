@@ -206,8 +206,12 @@ impl Seen<'_> {
                 let joint = hand::first_joint(finger) + [0, 3, 4][(k - 1) % 3];
                 match (finger, kind(k)) {
                     (0, Kind::Cmc) => true,
-                    (0, _) => self.held >> joint & 1 == 1 || self.bent(joint) < THUMB_STRAIGHT,
-                    _ if self.held >> joint & 1 == 1 => height(&self.segments[k]) > SEGMENT_LEVEL,
+                    // Without a heading its angle means nothing; a hinge soon has one.
+                    (_, Kind::Mcp) if self.held >> joint & 1 == 1 => {
+                        height(&self.segments[k]) > SEGMENT_LEVEL
+                    }
+                    _ if self.held >> joint & 1 == 1 => false,
+                    (0, _) => self.bent(joint) < THUMB_STRAIGHT,
                     _ => self.bent(joint) < STRAIGHT,
                 }
             })
