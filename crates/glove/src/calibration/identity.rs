@@ -1,8 +1,8 @@
-//! Which sensor sits where: each finger is bent alone, and every sensor belongs where it moved most.
+//! Which sensor sits where: each finger is bent alone, and every sensor belongs where it moved most against the hand.
 //!
-//! The path of a sensor against the hand's, summed over every third scan; the smallest of the five fingers' is taken off, so that a
-//! sway of the hand counts for nothing. Each finger must get exactly three, and the longer the path the nearer to the tip. The sensor on
-//! the hand shows itself by paths of its own that are alike in all five.
+//! The path of a sensor is its turns against the hand's sensor, summed over every third scan; the smallest of the five fingers' is taken
+//! off. Each finger must get exactly three, and the longer the path the nearer to the tip. The sensor on the hand is the one against
+//! which every other moves with one finger alone; so that any can be it, the paths between all pairs are kept.
 
 use super::algebra;
 use super::align::Aligned;
@@ -14,8 +14,11 @@ pub const FINGERS: usize = 5;
 /// A path is made of turns from every third scan to the next.
 const EVERY: u8 = 3;
 
-/// Another sensor is taken for the hand's if its paths differ by less than this share of what sensor 0's do.
-const PLAINLY_LESS: f32 = 0.5;
+/// Pairs of sensors.
+const PAIRS: usize = SEGMENT_COUNT * (SEGMENT_COUNT - 1) / 2;
+
+/// Another sensor than 0 is the hand's if the others' paths with fingers not their own are below this share of those against 0.
+const PLAINLY_LESS: f32 = 0.85;
 
 /// Which sensor sits on which segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,21 +40,24 @@ pub(super) const AS_WIRED: [u8; SEGMENT_COUNT] =
 /// Paths of all sensors while one finger after the other is bent.
 #[derive(Debug, Clone)]
 pub(super) struct Paths {
-    /// Against sensor 0, by finger.
-    relative: [[f32; SEGMENT_COUNT]; FINGERS],
-    /// By themselves, by finger.
-    alone: [[f32; SEGMENT_COUNT]; FINGERS],
+    /// Of each pair, by finger, radians.
+    pairs: [[f32; FINGERS]; PAIRS],
     /// Fingers that were bent (bit f).
     seen: u8,
-    last: [Option<(Quaternion, Quaternion)>; SEGMENT_COUNT],
+    last: [Option<Quaternion>; SEGMENT_COUNT],
     wait: u8,
+}
+
+/// The place of a pair of different sensors.
+fn pair(a: usize, b: usize) -> usize {
+    let (low, high) = if a < b { (a, b) } else { (b, a) };
+    high * (high - 1) / 2 + low
 }
 
 impl Paths {
     pub fn new() -> Self {
         Self {
-            relative: [[0.0; SEGMENT_COUNT]; FINGERS],
-            alone: [[0.0; SEGMENT_COUNT]; FINGERS],
+            pairs: [[0.0; FINGERS]; PAIRS],
             seen: 0,
             last: [None; SEGMENT_COUNT],
             wait: 0,
@@ -59,12 +65,12 @@ impl Paths {
     }
 
     pub fn begin(&mut self, finger: usize) {
-        if let (Some(relative), Some(alone)) =
-            (self.relative.get_mut(finger), self.alone.get_mut(finger))
-        {
-            (*relative, *alone) = ([0.0; SEGMENT_COUNT], [0.0; SEGMENT_COUNT]);
-            self.seen |= 1 << finger;
+        for paths in &mut self.pairs {
+            if let Some(path) = paths.get_mut(finger) {
+                *path = 0.0;
+            }
         }
+        self.seen |= 1u8.checked_shl(finger as u32).unwrap_or(0);
         (self.last, self.wait) = ([None; SEGMENT_COUNT], 0);
     }
 
@@ -72,34 +78,37 @@ impl Paths {
     pub fn add(&mut self, finger: usize, scan: &Aligned, turned: &[Quaternion; SEGMENT_COUNT]) {
         let wait = self.wait;
         self.wait = (wait + 1) % EVERY;
-        let (Some(relative), Some(alone)) =
-            (self.relative.get_mut(finger), self.alone.get_mut(finger))
-        else {
-            return;
-        };
-        if wait != 0 || !scan.is_good(0) {
+        if wait != 0 {
             return;
         }
-        let hand = turned[0].inverse();
-        for k in 0..SEGMENT_COUNT {
-            if !scan.is_good(k) {
-                continue;
+        // Each sensor's turn since the scan before, in the common world.
+        let turns: [Option<Quaternion>; SEGMENT_COUNT] = core::array::from_fn(|k| {
+            let now = scan.is_good(k).then_some(turned[k]);
+            let last = core::mem::replace(&mut self.last[k], now);
+            Some(now? * last?.inverse())
+        });
+        for (a, b) in (1..SEGMENT_COUNT).flat_map(|b| (0..b).map(move |a| (a, b))) {
+            if let (Some(of_a), Some(of_b)) = (turns[a], turns[b])
+                && let Some(path) = self.pairs[pair(a, b)].get_mut(finger)
+            {
+                *path += algebra::angle_of(&(of_a.inverse() * of_b));
             }
-            let now = (hand * turned[k], turned[k]);
-            if let Some((seen, own)) = self.last[k] {
-                relative[k] += algebra::angle_of(&(seen.inverse() * now.0));
-                alone[k] += algebra::angle_of(&(own.inverse() * now.1));
-            }
-            self.last[k] = Some(now);
         }
     }
 
-    /// How far sensor `k` turned against the hand's while `finger` was bent, beyond what it did with any other, radians.
+    /// The paths of sensor `k` against sensor `of`, by finger, less the smallest of them.
+    fn against(&self, of: usize, k: usize) -> [f32; FINGERS] {
+        if of == k || of >= SEGMENT_COUNT || k >= SEGMENT_COUNT {
+            return [0.0; FINGERS];
+        }
+        let own = self.pairs[pair(of, k)];
+        let least = own.iter().copied().fold(f32::INFINITY, f32::min);
+        own.map(|path| path - least)
+    }
+
+    /// How far sensor `k` turned against sensor 0 while `finger` was bent, beyond what it did with any other, radians.
     pub fn path(&self, finger: usize, k: usize) -> f32 {
-        beyond_least(&self.relative, k)
-            .get(finger)
-            .copied()
-            .unwrap_or(0.0)
+        self.against(0, k).get(finger).copied().unwrap_or(0.0)
     }
 
     pub fn identity(&self) -> Identity {
@@ -107,19 +116,12 @@ impl Paths {
             return Identity::NotSeen;
         }
         let hand = self.on_the_hand();
-        // Against a sensor that is not the hand's, all others would move.
-        let paths = if hand == 0 {
-            &self.relative
-        } else {
-            &self.alone
-        };
         let mut counts = [0; FINGERS];
         let mut seats = AS_WIRED;
         seats[0] = hand as u8;
         let mut lengths = [[0.0; 3]; FINGERS];
         for k in (0..SEGMENT_COUNT).filter(|&k| k != hand) {
-            let own = beyond_least(paths, k);
-            let (finger, length) = longest(&own);
+            let (finger, length) = longest(&self.against(hand, k));
             counts[finger] += 1;
             insert(
                 &mut seats[1 + 3 * finger..4 + 3 * finger],
@@ -139,12 +141,17 @@ impl Paths {
         }
     }
 
-    /// The sensor that is on the hand: its own paths are alike whatever finger bends.
+    /// The sensor that is on the hand: against it each other moves with one finger, and least with the four others.
     fn on_the_hand(&self) -> usize {
-        let differing = |k: usize| longest(&beyond_least(&self.alone, k)).1;
-        let least = (1..SEGMENT_COUNT).min_by(|&a, &b| differing(a).total_cmp(&differing(b)));
+        let astray = |of: usize| {
+            (0..SEGMENT_COUNT).fold(0.0, |sum, k| {
+                let paths = self.against(of, k);
+                sum + paths.iter().sum::<f32>() - longest(&paths).1
+            })
+        };
+        let least = (1..SEGMENT_COUNT).min_by(|&a, &b| astray(a).total_cmp(&astray(b)));
         match least {
-            Some(k) if differing(k) < PLAINLY_LESS * differing(0) => k,
+            Some(k) if astray(k) < PLAINLY_LESS * astray(0) => k,
             _ => 0,
         }
     }
@@ -160,12 +167,6 @@ fn insert(seats: &mut [u8], lengths: &mut [f32; 3], count: u8, k: u8, length: f3
         at -= 1;
     }
     (lengths[at], seats[at]) = (length, k);
-}
-
-fn beyond_least(paths: &[[f32; SEGMENT_COUNT]; FINGERS], k: usize) -> [f32; FINGERS] {
-    let own = paths.map(|row| row.get(k).copied().unwrap_or(0.0));
-    let least = own.iter().copied().fold(f32::INFINITY, f32::min);
-    own.map(|path| path - least)
 }
 
 fn longest(paths: &[f32; FINGERS]) -> (usize, f32) {
