@@ -223,6 +223,10 @@ impl Headings {
         let seat = |s: &u8| usize::from(*s) == sensor;
         if let Some(segment) = self.profile.sensors.iter().position(seat) {
             self.regain.lose(segment, &mut self.joints, at);
+            self.finder.forget(segment);
+            if let Some(pose) = &mut self.asked {
+                pose.forget(segment);
+            }
         }
     }
 

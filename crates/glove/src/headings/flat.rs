@@ -85,6 +85,15 @@ impl Pose {
         }
     }
 
+    /// The sensor on `segment` restarted: what was seen of the joints on both sides of it is of another heading.
+    pub fn forget(&mut self, segment: usize) {
+        for k in 1..SEGMENT_COUNT {
+            if k == segment || hand::parent(k) == Some(segment) {
+                (self.sums[k], self.up[k], self.n[k]) = ([0.0; 2], 0.0, 0);
+            }
+        }
+    }
+
     /// The heading across joint `k`; `None` with too few scans.
     pub fn heading(&self, k: usize) -> Option<f32> {
         let enough = *self.n.get(k)? >= super::POSE_SCANS;
@@ -151,6 +160,11 @@ impl Finder {
     pub fn taken(&mut self, at: Instant) {
         self.taken = Some(at);
         self.done = true;
+    }
+
+    /// The sensor on `segment` restarted.
+    pub fn forget(&mut self, segment: usize) {
+        self.pose.forget(segment);
     }
 
     /// A scan; the pose, when there has been one for long enough.

@@ -7,13 +7,11 @@
 use super::joint::{Joint, Kind, Look};
 use crate::calibration::algebra;
 use crate::hand::{self, SEGMENT_COUNT};
-use crate::timing::{after, since};
+use crate::timing::since;
 use crate::{Duration, Instant};
 
 /// A hinge is looked at for so long.
 const LOOKS_FOR: Duration = Duration::from_ticks(500_000);
-/// Longer looks begin anew: what was seen at first is old.
-const GIVES_UP: Duration = Duration::from_ticks(3_000_000);
 /// Fewer looks are too few, however long they took.
 const LOOKS_MIN: u16 = 10;
 /// The mean squared cosine of the axis' elevation that is enough.
@@ -117,15 +115,15 @@ impl Regain {
             since: at,
         };
         let slot = self.looks.get_mut(k)?;
-        let looks = slot
-            .filter(|looks| at <= after(looks.since, GIVES_UP))
-            .unwrap_or(begun);
-        let looks = Looks {
-            sin: looks.sin + look.sin,
-            cos: looks.cos + look.cos,
-            n: looks.n.saturating_add(1),
-            since: looks.since,
-        };
+        let mut looks = slot.unwrap_or(begun);
+        if looks.n >= LOOKS_MIN && since(at, looks.since) > LOOKS_FOR {
+            // So far they were not enough: the oldest fade, and what is seen now counts.
+            let fades = 1.0 - 1.0 / f32::from(looks.n);
+            (looks.sin, looks.cos) = (fades * looks.sin, fades * looks.cos);
+        } else {
+            looks.n = looks.n.saturating_add(1);
+        }
+        (looks.sin, looks.cos) = (looks.sin + look.sin, looks.cos + look.cos);
         *slot = Some(looks);
         let length = libm::sqrtf(looks.sin * looks.sin + looks.cos * looks.cos);
         let enough = looks.n >= LOOKS_MIN
