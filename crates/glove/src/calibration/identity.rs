@@ -2,7 +2,7 @@
 //!
 //! The path of a sensor is its turns against the hand's sensor, summed over every third scan; the smallest of the five fingers' is taken
 //! off. Each finger must get exactly three, and the longer the path the nearer to the tip. The sensor on the hand is the one against
-//! which every other moves with one finger alone; so that any can be it, the paths between all pairs are kept.
+//! which others rest whatever finger bends; so that any can be it, the paths between all pairs are kept.
 
 use super::algebra;
 use super::align::Aligned;
@@ -17,7 +17,10 @@ const EVERY: u8 = 3;
 /// Pairs of sensors.
 const PAIRS: usize = SEGMENT_COUNT * (SEGMENT_COUNT - 1) / 2;
 
-/// Another sensor than 0 is the hand's if the others' paths with fingers not their own are below this share of those against 0.
+/// While a finger bends at least so many others rest against the hand: its neighbours may bend with it, and the one before may be late.
+const RESTING: usize = 5;
+
+/// Another sensor than 0 is the hand's if the others rest so much better against it.
 const PLAINLY_LESS: f32 = 0.85;
 
 /// Which sensor sits on which segment.
@@ -141,17 +144,21 @@ impl Paths {
         }
     }
 
-    /// The sensor that is on the hand: against it each other moves with one finger, and least with the four others.
+    /// The sensor that is on the hand: whatever finger bends, some others rest against it.
     fn on_the_hand(&self) -> usize {
-        let astray = |of: usize| {
-            (0..SEGMENT_COUNT).fold(0.0, |sum, k| {
-                let paths = self.against(of, k);
-                sum + paths.iter().sum::<f32>() - longest(&paths).1
+        let restless = |of: usize| {
+            (0..FINGERS).fold(0.0, |sum, finger| {
+                let mut paths = [f32::INFINITY; SEGMENT_COUNT];
+                for (k, path) in paths.iter_mut().enumerate().filter(|(k, _)| *k != of) {
+                    *path = self.pairs[pair(of, k)][finger];
+                }
+                paths.sort_unstable_by(f32::total_cmp);
+                sum + paths[RESTING - 1]
             })
         };
-        let least = (1..SEGMENT_COUNT).min_by(|&a, &b| astray(a).total_cmp(&astray(b)));
+        let least = (1..SEGMENT_COUNT).min_by(|&a, &b| restless(a).total_cmp(&restless(b)));
         match least {
-            Some(k) if astray(k) < PLAINLY_LESS * astray(0) => k,
+            Some(k) if restless(k) < PLAINLY_LESS * restless(0) => k,
             _ => 0,
         }
     }
