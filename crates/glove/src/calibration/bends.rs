@@ -79,8 +79,9 @@ impl Moments {
         let mut axis = algebra::unit(algebra::X)?;
         // Starts from the column that is longest: never at right angles to what is looked for.
         let mut longest = 0.0;
-        for column in 1..4 {
-            let v = [moved[1][column], moved[2][column], moved[3][column]];
+        for row in moved.iter().skip(1) {
+            // Symmetric: a row is a column.
+            let v = [row[1], row[2], row[3]];
             let length = algebra::norm(v);
             if length > longest {
                 (longest, axis) = (length, algebra::unit(v)?);

@@ -62,13 +62,12 @@ impl Session {
             return Err(Unfinished::NoFlat);
         }
         let mut last_flat = [Quaternion::identity(); SEGMENT_COUNT];
-        for k in 0..SEGMENT_COUNT {
-            let sensor = self.seats[k];
+        for (own, sensor) in last_flat.iter_mut().zip(self.seats) {
             let seen = self.turn.heading(usize::from(sensor)).is_some()
                 && before.iter().any(|f| f.mean(usize::from(sensor)).is_some());
             let missing = Unfinished::NoSamples { sensor };
             let mean = last.iter().find_map(|f| f.mean(usize::from(sensor)));
-            last_flat[k] = mean.filter(|_| seen).ok_or(missing)?;
+            *own = mean.filter(|_| seen).ok_or(missing)?;
         }
         let of_hand = by_sensor[usize::from(self.seats[0])];
         let headings = self

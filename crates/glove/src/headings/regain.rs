@@ -54,9 +54,9 @@ impl Regain {
         } else if let Some(kept) = self.kept.get_mut(segment) {
             *kept = None;
         }
-        for k in 1..SEGMENT_COUNT {
+        for (k, joint) in joints.iter_mut().enumerate().skip(1) {
             if k == segment || hand::parent(k) == Some(segment) {
-                joints[k].known = false;
+                joint.known = false;
                 (self.looks[k], self.lost[k]) = (None, at);
             }
         }
@@ -65,10 +65,10 @@ impl Regain {
     /// Notes the headings of all sensors that are known along the chain from the hand.
     fn keep(&mut self, joints: &[Joint; SEGMENT_COUNT]) {
         self.kept[0] = Some(0.0);
-        for k in 1..SEGMENT_COUNT {
+        for (k, joint) in joints.iter().enumerate().skip(1) {
             let parent = self.kept[hand::parent(k).unwrap_or(0)];
-            if let (Some(parent), true) = (parent, joints[k].known) {
-                self.kept[k] = Some(algebra::wrap(parent + joints[k].heading));
+            if let (Some(parent), true) = (parent, joint.known) {
+                self.kept[k] = Some(algebra::wrap(parent + joint.heading));
             }
         }
     }
@@ -81,25 +81,22 @@ impl Regain {
         at: Instant,
     ) {
         let mut found = false;
-        for k in 1..SEGMENT_COUNT {
+        for (k, joint) in joints.iter_mut().enumerate().skip(1) {
             // One that follows from its neighbours is not looked at.
-            if joints[k].known || joints[k].kind != Kind::Hinge || self.follows(k).is_some() {
+            if joint.known || joint.kind != Kind::Hinge || self.follows(k).is_some() {
                 continue;
             }
             let Some(look) = look(k) else {
                 self.looks[k] = None;
                 continue;
             };
-            let Some(heading) = self.add(k, look, at) else {
-                continue;
-            };
-            self.looks[k] = None;
-            let away = since(at, self.lost[k]);
-            let heading = heading - joints[k].offset();
-            joints[k].regain(heading, away, at);
-            self.connect(k, joints[k].heading);
-            found = true;
-            break;
+            if let Some(heading) = self.add(k, look, at) {
+                self.looks[k] = None;
+                joint.regain(heading - joint.offset(), since(at, self.lost[k]), at);
+                // The next hinge of the finger may follow from it.
+                self.connect(k, joint.heading);
+                found = true;
+            }
         }
         if found {
             self.follow(joints, at);
@@ -151,10 +148,8 @@ impl Regain {
     /// Sets the joints that follow from their neighbours, along each finger and back.
     fn follow(&mut self, joints: &mut [Joint; SEGMENT_COUNT], at: Instant) {
         for _ in 0..2 {
-            for k in 1..SEGMENT_COUNT {
-                if joints[k].known {
-                    self.connect(k, joints[k].heading);
-                }
+            for (k, joint) in joints.iter().enumerate().skip(1).filter(|(_, j)| j.known) {
+                self.connect(k, joint.heading);
             }
         }
         for (k, joint) in joints.iter_mut().enumerate().skip(1) {

@@ -151,7 +151,7 @@ impl<'a> Model<'a> {
             person,
             mounting,
             axes,
-            thumb_base: about([0.05, 0.0, side * -1.0], (50.0f64).to_radians()),
+            thumb_base: about([0.05, 0.0, -side], (50.0f64).to_radians()),
             heading: std::array::from_fn(|_| rng.random_range(-PI..PI)),
             rate: std::array::from_fn(|_| rng.random_range(-1.0f64..1.0).to_radians() / 60.0),
             unstraight,
