@@ -35,6 +35,7 @@ fn class(joint: usize) -> usize {
 struct Run {
     outcome: Outcome,
     readings: Vec<(Reading, [f64; 25])>,
+    rate: f64,
 }
 
 impl Run {
@@ -61,7 +62,7 @@ impl Run {
             .filter_map(|joint| {
                 let scans = self.readings.iter().filter(|(r, _)| r.at >= from);
                 let held = scans.filter(|(r, _)| r.held >> joint & 1 == 1).count();
-                (held > 0).then_some((joint, held as f64 / synthetic::RATE))
+                (held > 0).then_some((joint, held as f64 / self.rate))
             })
             .collect()
     }
@@ -163,7 +164,11 @@ fn run_with(person: &Person, config: Config, next_day: bool) -> Run {
         session.take(&aligned);
     }
     let (outcome, _) = calibrated.expect("a calibration");
-    Run { outcome, readings }
+    Run {
+        outcome,
+        readings,
+        rate: person.rate,
+    }
 }
 
 fn doubts(run: &Run) -> Vec<String> {
@@ -187,6 +192,41 @@ fn an_exact_person_is_measured_within_a_degree_or_two_on_either_hand() {
         assert_eq!(run.held(USE_FROM), vec![], "nothing is held");
         run.assert_within(EXACT, if is_left { "left" } else { "right" });
     }
+}
+
+#[test]
+fn twice_and_more_as_many_scans_a_second_give_the_same() {
+    for rate in [67.0, 88.0] {
+        let person = Person {
+            rate,
+            restarts: vec![Restart {
+                sensor: 5,
+                at: 75.0,
+                away: 0.68,
+            }],
+            ..Person::exact(50)
+        };
+        let run = run(&person);
+        assert_eq!(doubts(&run), Vec::<String>::new());
+        let held: Vec<usize> = run.held(USE_FROM).into_iter().map(|h| h.0).collect();
+        assert_eq!(held, [8, 9]);
+        run.assert_within(EXACT, &format!("{rate} scans/s"));
+    }
+}
+
+#[test]
+fn a_joint_less_sure_than_stated_is_held() {
+    let config = Config {
+        degraded: 1.1f32.to_radians(),
+        ..Config::default()
+    };
+    // Right after a calibration a hinge's heading is known to 1.0°, an MCP's to 1.2°.
+    let run = run_with(&Person::exact(60), config, false);
+    let first = run.readings.first().expect("readings").0.held;
+    let bases = (0..JOINT_COUNT)
+        .filter(|j| j % 5 < 3)
+        .fold(0u32, |mask, j| mask | 1 << j);
+    assert_eq!(first, bases);
 }
 
 fn swapped(pairs: &[(usize, usize)]) -> [usize; 16] {

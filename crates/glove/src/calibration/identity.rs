@@ -1,18 +1,20 @@
 //! Which sensor sits where: each finger is bent alone, and every sensor belongs where it moved most against the hand.
 //!
-//! The path of a sensor is its turns against the hand's sensor, summed over every third scan; the smallest of the five fingers' is taken
+//! The path of a sensor is its turns against the hand's sensor, summed over every 80 ms; the smallest of the five fingers' is taken
 //! off. Each finger must get exactly three, and the longer the path the nearer to the tip. The sensor on the hand is the one against
 //! which others rest whatever finger bends; so that any can be it, the paths between all pairs are kept.
 
 use super::algebra;
 use super::align::Aligned;
 use crate::hand::{Quaternion, SEGMENT_COUNT};
+use crate::timing::since;
+use crate::{Duration, Instant};
 
 /// Fingers, in the order of the segments: thumb, index, middle, ring, little.
 pub const FINGERS: usize = 5;
 
-/// A path is made of turns from every third scan to the next.
-const EVERY: u8 = 3;
+/// A path is made of turns over this long at least: every third scan at 35 scans a second. Shorter ones are noise.
+const EVERY: Duration = Duration::from_ticks(80_000);
 
 /// Pairs of sensors.
 const PAIRS: usize = SEGMENT_COUNT * (SEGMENT_COUNT - 1) / 2;
@@ -48,7 +50,8 @@ pub(super) struct Paths {
     /// Fingers that were bent (bit f).
     seen: u8,
     last: [Option<Quaternion>; SEGMENT_COUNT],
-    wait: u8,
+    /// When the newest turn ended.
+    at: Option<Instant>,
 }
 
 /// The place of a pair of different sensors.
@@ -63,7 +66,7 @@ impl Paths {
             pairs: [[0.0; FINGERS]; PAIRS],
             seen: 0,
             last: [None; SEGMENT_COUNT],
-            wait: 0,
+            at: None,
         }
     }
 
@@ -74,17 +77,16 @@ impl Paths {
             }
         }
         self.seen |= 1u8.checked_shl(finger as u32).unwrap_or(0);
-        (self.last, self.wait) = ([None; SEGMENT_COUNT], 0);
+        (self.last, self.at) = ([None; SEGMENT_COUNT], None);
     }
 
     /// A scan; `turned`: the sensors with their headings taken out.
     pub fn add(&mut self, finger: usize, scan: &Aligned, turned: &[Quaternion; SEGMENT_COUNT]) {
-        let wait = self.wait;
-        self.wait = (wait + 1) % EVERY;
-        if wait != 0 {
+        if self.at.is_some_and(|at| since(scan.at, at) < EVERY) {
             return;
         }
-        // Each sensor's turn since the scan before, in the common world.
+        self.at = Some(scan.at);
+        // Each sensor's turn since then, in the common world.
         let turns: [Option<Quaternion>; SEGMENT_COUNT] = core::array::from_fn(|k| {
             let now = scan.is_good(k).then_some(turned[k]);
             let last = core::mem::replace(&mut self.last[k], now);

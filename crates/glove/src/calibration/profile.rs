@@ -97,3 +97,29 @@ impl Profile {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_are_no_profile_are_refused_by_name() {
+        let good = Profile::straight(Side::Left);
+        assert_eq!(good.check(), Ok(()));
+        let mut twice = good;
+        twice.sensors[3] = 4;
+        assert_eq!(twice.check(), Err(Invalid::Sensors));
+        let mut beyond = good;
+        beyond.sensors[3] = 200;
+        assert_eq!(beyond.check(), Err(Invalid::Sensors));
+        let mut long = good;
+        long.axes[9] = [1.0, 0.2, 0.0];
+        assert_eq!(long.check(), Err(Invalid::Segment(9)));
+        let mut nothing = good;
+        nothing.mounting[2] = algebra::quaternion(f32::NAN, 0.0, 0.0, 0.0);
+        assert_eq!(nothing.check(), Err(Invalid::Segment(2)));
+        let mut base = good;
+        base.thumb_base = algebra::quaternion(0.0, 0.0, 0.0, 0.0);
+        assert_eq!(base.check(), Err(Invalid::ThumbBase));
+    }
+}

@@ -8,15 +8,13 @@ use glove::calibration::{Finger, Step};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Scans a second.
-pub const RATE: f64 = 35.0;
 /// When the use begins, and how long it is, seconds.
 pub const USE_FROM: f64 = 58.0;
 pub const USE_FOR: f64 = 60.0;
 /// Flat poses in the use: when they begin; each lasts 2 s.
 pub const FLAT_IN_USE: [f64; 2] = [86.0, 114.0];
-/// How far a sensor's read is behind the one before, seconds.
-const SKEW: f64 = 1.8e-3;
+/// How far a sensor's read is behind the one before, in parts of a scan.
+const SKEW: f64 = 1.8e-3 * 35.0;
 
 type Q = [f64; 4];
 type V = [f64; 3];
@@ -33,6 +31,8 @@ pub struct Restart {
 #[derive(Debug, Clone)]
 pub struct Person {
     pub seed: u64,
+    /// Scans a second.
+    pub rate: f64,
     pub is_left: bool,
     /// The sensor on each segment.
     pub seats: [usize; 16],
@@ -55,6 +55,7 @@ impl Person {
     pub fn exact(seed: u64) -> Self {
         Self {
             seed,
+            rate: 35.0,
             is_left: false,
             seats: std::array::from_fn(|k| k),
             restarts: Vec::new(),
@@ -108,9 +109,9 @@ pub fn steps() -> Vec<(Step, f64, f64)> {
 /// The whole session.
 pub fn session(person: &Person) -> Vec<Scan> {
     let mut model = Model::new(person);
-    let scans = ((USE_FROM + USE_FOR) * RATE) as usize;
+    let scans = ((USE_FROM + USE_FOR) * person.rate) as usize;
     (0..scans)
-        .map(|i| model.scan(0.05 + i as f64 / RATE))
+        .map(|i| model.scan(0.05 + i as f64 / person.rate))
         .collect()
 }
 
@@ -165,7 +166,7 @@ impl<'a> Model<'a> {
     fn scan(&mut self, at: f64) -> Scan {
         let mut reads = [(None, Instant::from_ticks(0)); 16];
         for (segment, &sensor) in self.person.seats.clone().iter().enumerate() {
-            let t = at + SKEW * sensor as f64;
+            let t = at + SKEW / self.person.rate * sensor as f64;
             let stamp = Instant::from_ticks((t * 1e6).round() as u64);
             reads[sensor] = (Some(self.read(segment, sensor, t)), stamp);
         }
