@@ -9,6 +9,7 @@
 //! again takes the bending with it, which rests on its headings.
 
 use crate::hand::{self, Quaternion, SEGMENT_COUNT, Side};
+use algebra::Half;
 use bends::Moments;
 use flats::Flat;
 use identity::{AS_WIRED, Paths};
@@ -112,6 +113,8 @@ pub struct Session {
     turn: Turn,
     /// By sensor, against sensor 0; once the turn is over.
     headings: Option<[f32; SEGMENT_COUNT]>,
+    /// Half of each.
+    halves: [Half; SEGMENT_COUNT],
     paths: Paths,
     /// By segment: of the joint to its parent, while its finger was bent alone.
     alone: [Moments; SEGMENT_COUNT],
@@ -137,6 +140,7 @@ impl Session {
             flats_made: 0,
             turn: Turn::new(None),
             headings: None,
+            halves: [[1.0, 0.0]; SEGMENT_COUNT],
             paths: Paths::new(),
             alone: [Moments::new(); SEGMENT_COUNT],
             together: [[Moments::new(); SEGMENT_COUNT]; 3],
@@ -192,6 +196,7 @@ impl Session {
                 for (k, heading) in headings.iter_mut().enumerate() {
                     *heading = self.turn.heading(k).map_or(0.0, |found| found.delta);
                 }
+                self.halves = headings.map(algebra::half);
                 self.headings = Some(headings);
             }
             Some(Step::Alone(_)) => self.take_seats(),
@@ -238,10 +243,7 @@ impl Session {
 
     /// The sensors with their headings taken out.
     fn turned(&self, scan: &Aligned) -> [Quaternion; SEGMENT_COUNT] {
-        let headings = self.headings.unwrap_or([0.0; SEGMENT_COUNT]);
-        core::array::from_fn(|k| {
-            algebra::turned_back(algebra::half(headings[k]), &scan.orientations[k])
-        })
+        core::array::from_fn(|k| algebra::turned_back(self.halves[k], &scan.orientations[k]))
     }
 
     /// The fingers were bent alone: from now on each sensor counts where it sits.

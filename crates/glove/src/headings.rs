@@ -223,11 +223,10 @@ impl Headings {
         };
         self.turn = (self.turn + 1) % SPREAD;
         for k in 1..SEGMENT_COUNT {
-            let sin2 = self.bent(k);
-            let joint = &mut self.joints[k];
-            joint.pass(seconds);
-            if joint.known && (k - 1) % usize::from(SPREAD) == usize::from(self.turn) {
-                joint.update(look(k), sin2, scan.at);
+            self.joints[k].pass(seconds);
+            if self.joints[k].known && (k - 1) % usize::from(SPREAD) == usize::from(self.turn) {
+                let sin2 = self.bent(k);
+                self.joints[k].update(look(k), sin2, scan.at);
             }
         }
         self.regain.take(&mut self.joints, look, scan.at);
@@ -273,7 +272,7 @@ impl Headings {
         for k in 1..SEGMENT_COUNT {
             let was = self.degraded >> k & 1 == 1;
             let share = if was { RECOVERED } else { 1.0 };
-            let sure = self.joints[k].sigma() <= share * self.config.degraded;
+            let sure = self.joints[k].is_sure(share * self.config.degraded);
             self.degraded = self.degraded & !(1 << k) | u16::from(!sure) << k;
         }
     }

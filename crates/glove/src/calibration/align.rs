@@ -95,8 +95,8 @@ fn between(
     stamp: Instant,
     at: Instant,
 ) -> Option<Quaternion> {
-    let back = since(stamp, at).as_ticks();
-    if back == 0 {
+    let back = since(stamp, at);
+    if back.as_ticks() == 0 {
         return Some(now);
     }
     let (before, then) = before?;
@@ -104,9 +104,17 @@ fn between(
     if apart > APART || apart.as_ticks() == 0 {
         return None;
     }
-    let share = back as f32 / apart.as_ticks() as f32;
+    let share = algebra::seconds(back) / algebra::seconds(apart);
     let share = if share < 1.0 { share } else { 1.0 };
-    algebra::normalised(now.into_inner() * (1.0 - share) + before.into_inner() * share)
+    let mixed = now.into_inner() * (1.0 - share) + before.into_inner() * share;
+    let squared = mixed.norm_squared();
+    if squared < 0.97 {
+        // Turned by more than 40° between two reads.
+        return algebra::normalised(mixed);
+    }
+    Some(Quaternion::new_unchecked(
+        mixed * algebra::near_unit(squared),
+    ))
 }
 
 #[cfg(test)]

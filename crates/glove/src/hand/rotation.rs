@@ -35,13 +35,12 @@ pub(crate) fn decompose(rotation: &Quaternion) -> [f32; 3] {
     let r21 = 2.0 * (y * z + w * x);
     let cos_b = libm::sqrtf(r12 * r12 + r22 * r22);
     // Below this the last column is rounding error (a sensor's step is 2⁻¹⁴): no flexion can be read from it.
-    let a = if cos_b < 1e-5 {
-        0.0
+    let (a, sin_a, cos_a) = if cos_b < 1e-5 {
+        (0.0, 0.0, 1.0)
     } else {
-        libm::atan2f(-r12, r22)
+        (libm::atan2f(-r12, r22), -r12 / cos_b, r22 / cos_b)
     };
     let b = libm::atan2f(r02, cos_b);
-    let (sin_a, cos_a) = libm::sincosf(a);
     let c = libm::atan2f(cos_a * r10 + sin_a * r20, cos_a * r11 + sin_a * r21);
     [a, b, c]
 }

@@ -123,8 +123,10 @@ pub(super) struct Joint {
     /// What has not entered yet of a correction, radians, and how much of it enters in a second.
     lag: f32,
     enters: f32,
-    /// Half of the heading as it is shown.
-    shown: Half,
+    /// The heading as it is shown, and half of it.
+    shown: (f32, Half),
+    /// How often that was turned on by a little since it was worked out.
+    steps: u8,
 }
 
 impl Joint {
@@ -140,7 +142,8 @@ impl Joint {
             at: Instant::from_ticks(0),
             lag: 0.0,
             enters: 0.0,
-            shown: [1.0, 0.0],
+            shown: (0.0, [1.0, 0.0]),
+            steps: 0,
         };
         joint.set(0.0, kind.first(), joint.at);
         joint.p[5] = kind.offset() * kind.offset();
@@ -156,7 +159,7 @@ impl Joint {
         let offset = self.p[5];
         self.p = [sigma * sigma, 0.0, 0.0, RATE * RATE, 0.0, offset];
         (self.at, self.lag, self.enters) = (at, 0.0, 0.0);
-        self.shown = algebra::half(self.heading);
+        self.shown = (self.heading, algebra::half(self.heading));
     }
 
     /// The heading that a calibration found.
@@ -166,7 +169,7 @@ impl Joint {
 
     /// The heading found beside a sensor that restarted `away` ago.
     pub fn regain(&mut self, heading: f32, away: Duration, at: Instant) {
-        let drifted = RATE * (away.as_ticks() as f32 * 1e-6);
+        let drifted = RATE * algebra::seconds(away);
         let sigma = libm::sqrtf(REGAINED * REGAINED + drifted * drifted);
         self.set(heading, sigma, at);
     }
@@ -178,7 +181,29 @@ impl Joint {
 
     /// Half of the heading as it is shown: what a correction changes enters slowly.
     pub fn shown(&self) -> Half {
-        self.shown
+        self.shown.1
+    }
+
+    /// Brings what is shown up to date. A sine costs a chip more than all the rest of a joint: small steps go without.
+    fn show(&mut self) {
+        const SMALL: f32 = 0.03;
+        let (before, half) = self.shown;
+        let now = algebra::wrap(self.heading + self.lag);
+        let step = algebra::wrap(now - before);
+        self.steps = self.steps.wrapping_add(1);
+        let half = if libm::fabsf(step) > SMALL || self.steps == 0 {
+            algebra::half(now)
+        } else {
+            let [c, s] = algebra::half_product(half, algebra::small_half(step));
+            let unit = algebra::near_unit(c * c + s * s);
+            [unit * c, unit * s]
+        };
+        self.shown = (now, half);
+    }
+
+    /// Whether the heading is known to `sigma`.
+    pub fn is_sure(&self, sigma: f32) -> bool {
+        self.p[0] <= sigma * sigma
     }
 
     /// What a look at the axis shows beyond the heading, radians.
@@ -197,12 +222,12 @@ impl Joint {
         } else {
             self.lag - step
         };
-        self.shown = algebra::half(self.heading + self.lag);
+        self.show();
     }
 
     /// Time has passed since the joint was looked at last. Seconds.
     fn predict(&mut self, at: Instant) -> f32 {
-        let dt = since(at, self.at).as_ticks() as f32 * 1e-6;
+        let dt = algebra::seconds(since(at, self.at));
         self.at = at;
         self.heading = algebra::wrap(self.heading + self.rate * dt);
         let [hh, hr, ho, rr, ro, oo] = &mut self.p;
@@ -229,7 +254,7 @@ impl Joint {
             let off = algebra::wrap(seen - self.offset);
             self.correct(off, 1.0, variance * repeated / look.seen);
         }
-        self.shown = algebra::half(self.heading + self.lag);
+        self.show();
     }
 
     /// A flat pose shows the heading `measured`. How far it was off, radians.
@@ -245,7 +270,7 @@ impl Joint {
         self.correct(off, 0.0, sigma * sigma);
         self.lag += algebra::wrap(before - self.heading);
         self.enters = self.lag / ENTERS;
-        self.shown = algebra::half(self.heading + self.lag);
+        self.show();
         off
     }
 
