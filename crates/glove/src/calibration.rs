@@ -122,7 +122,10 @@ pub struct Session {
     together: [[Moments; SEGMENT_COUNT]; 3],
     /// The sensor on each segment, as far as is known.
     seats: [u8; SEGMENT_COUNT],
+    /// Sensors that started anew (bit k: as it is wired) after the second flat pose: what they say since is of another heading.
     restarted: u16,
+    /// … or at a time when that spoils the session.
+    spoiled: u16,
 }
 
 impl Default for Session {
@@ -146,6 +149,7 @@ impl Session {
             together: [[Moments::new(); SEGMENT_COUNT]; 3],
             seats: AS_WIRED,
             restarted: 0,
+            spoiled: 0,
         }
     }
 
@@ -204,15 +208,25 @@ impl Session {
         }
     }
 
-    /// A sensor started anew (as it is wired): what was measured of its heading is lost.
+    /// A sensor started anew (as it is wired). Once there are its heading by the turn and two flat poses it is left out of the bending,
+    /// and the last flat pose gives the new heading; before, and during that pose, the session is spoiled.
     pub fn restarted(&mut self, sensor: usize) {
-        if self.step.is_some() || self.flats_made != 0 {
-            self.restarted |= 1u16.checked_shl(sensor as u32).unwrap_or(0);
+        let bit = 1u16.checked_shl(sensor as u32).unwrap_or(0);
+        let measured = self.headings.is_some() && self.flats_made & 0b11 == 0b11;
+        match self.step {
+            None if self.flats_made == 0 => {}
+            Some(Step::SecondFlat | Step::LastFlat) => self.spoiled |= bit,
+            _ if measured && self.flats_made & 0b100 == 0 => self.restarted |= bit,
+            _ => self.spoiled |= bit,
         }
     }
 
     /// Takes a scan of the step under way.
     pub fn take(&mut self, scan: &Aligned) {
+        let bending = Aligned {
+            good: scan.good & !self.restarted,
+            ..*scan
+        };
         match self.step {
             None => {}
             Some(Step::FirstFlat) => self.flats[0].add(scan),
@@ -220,7 +234,7 @@ impl Session {
             Some(Step::LastFlat) => self.flats[2].add(scan),
             Some(Step::Turn) => self.turn.add(scan),
             Some(Step::Alone(finger)) => {
-                let turned = self.turned(scan);
+                let (scan, turned) = (&bending, self.turned(scan));
                 self.paths.add(finger.number(), scan, &turned);
                 let first = hand::first_segment(finger.number());
                 let own = first..first + 3;
@@ -228,9 +242,9 @@ impl Session {
                     own.contains(&k)
                 });
             }
-            Some(Step::Fists) => self.bend_together(FISTS, scan),
-            Some(Step::Thumb) => self.bend_together(THUMB, scan),
-            Some(Step::Free) => self.bend_together(FREE, scan),
+            Some(Step::Fists) => self.bend_together(FISTS, &bending),
+            Some(Step::Thumb) => self.bend_together(THUMB, &bending),
+            Some(Step::Free) => self.bend_together(FREE, &bending),
         }
     }
 

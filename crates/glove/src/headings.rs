@@ -117,8 +117,17 @@ impl Headings {
         let mut headings = Self::new(&outcome.profile, config);
         for k in 1..SEGMENT_COUNT {
             let parent = hand::parent(k).unwrap_or(0);
-            let across = outcome.headings[k] - outcome.headings[parent];
-            headings.joints[k].start(algebra::wrap(across), at);
+            let across = algebra::wrap(outcome.headings[k] - outcome.headings[parent]);
+            let seats = &outcome.profile.sensors;
+            if (outcome.checks.restarted >> seats[k] | outcome.checks.restarted >> seats[parent])
+                & 1
+                == 1
+            {
+                // One flat pose is all there is.
+                headings.joints[k].pose(across, at);
+            } else {
+                headings.joints[k].start(across, at);
+            }
         }
         headings
     }

@@ -443,20 +443,63 @@ fn a_sensor_that_slipped_by_20_degrees_is_named() {
 }
 
 #[test]
-fn a_sensor_that_restarts_in_the_session_spoils_it_and_is_named() {
+fn a_sensor_that_restarts_while_fingers_bend_gets_its_heading_from_the_last_flat_pose() {
+    for (i, sensor) in [6, 0, 1, 7, 11].into_iter().enumerate() {
+        let person = Person {
+            restarts: vec![Restart {
+                sensor,
+                at: 33.0 + 4.0 * i as f64,
+                away: 0.68,
+            }],
+            ..Person::exact(1000 + i as u64)
+        };
+        let run = run(&person);
+        let named = Doubt::Restarted {
+            sensor: sensor as u8,
+            spoils: false,
+        };
+        let doubts: Vec<Doubt> = run.outcome.checks.doubts().collect();
+        assert_eq!(doubts, [named], "sensor {sensor}");
+        run.assert_within(
+            [1.5, 1.5, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0],
+            "in the session",
+        );
+    }
+}
+
+#[test]
+fn a_sensor_that_restarts_before_its_heading_is_known_spoils_the_session() {
+    for (i, at) in [2.0, 3.5, 10.0, 17.0, 19.5, 56.0].into_iter().enumerate() {
+        let person = Person {
+            restarts: vec![Restart {
+                sensor: 6,
+                at,
+                away: 0.68,
+            }],
+            ..Person::exact(1100 + i as u64)
+        };
+        let run = run(&person);
+        let named = Doubt::Restarted {
+            sensor: 6,
+            spoils: true,
+        };
+        assert!(run.outcome.checks.doubts().any(|d| d == named), "at {at} s");
+        assert_eq!(run.outcome.checks.verdict(6), Verdict::Bad);
+    }
+}
+
+#[test]
+fn a_sensor_that_restarts_in_a_flat_pose_that_was_asked_for_does_not_spoil_it() {
     let person = Person {
         restarts: vec![Restart {
-            sensor: 6,
-            at: 33.0,
+            sensor: 9,
+            at: FLAT_IN_USE[0] + 0.6,
             away: 0.68,
         }],
-        ..Person::exact(1000)
+        ..Person::exact(1200)
     };
-    let run = run(&person);
-    let named = run
-        .outcome
-        .checks
-        .doubts()
-        .any(|d| d == Doubt::Restarted { sensor: 6 });
-    assert!(named, "{:?}", doubts(&run));
+    run_with(&person, Config::default(), true).assert_within(
+        [1.5, 1.5, 2.0, 2.0, 2.0, 2.0, 3.0, 3.0, 3.0],
+        "restart in a pose",
+    );
 }

@@ -63,8 +63,10 @@ pub struct Checks {
     pub innovation: [f32; SEGMENT_COUNT],
     /// The largest angle of each finger joint in the last flat pose.
     pub flat_angle: [f32; SEGMENT_COUNT],
-    /// Sensors that started anew in the session (bit k: as it is wired).
+    /// Sensors that started anew after the second flat pose (bit k: as it is wired): less is known of them.
     pub restarted: u16,
+    /// Sensors that started anew at a time when that spoils the session.
+    pub spoiled: u16,
 }
 
 /// Something a check found.
@@ -74,6 +76,8 @@ pub enum Doubt {
     Restarted {
         /// As it is wired.
         sensor: u8,
+        /// Its heading is lost; else the last flat pose gives it.
+        spoils: bool,
     },
     /// The five fingers did not show three sensors each.
     Unclear {
@@ -159,9 +163,10 @@ impl Doubt {
     pub fn verdict(&self) -> Verdict {
         match self {
             Doubt::NotTurned { ratio, .. } if *ratio <= RATIO_USELESS => Verdict::Doubtful,
-            Doubt::Elsewhere { .. } | Doubt::NotBent { .. } | Doubt::Leans { .. } => {
-                Verdict::Doubtful
-            }
+            Doubt::Restarted { spoils: false, .. }
+            | Doubt::Elsewhere { .. }
+            | Doubt::NotBent { .. }
+            | Doubt::Leans { .. } => Verdict::Doubtful,
             _ => Verdict::Bad,
         }
     }
@@ -186,8 +191,11 @@ impl Checks {
     /// Everything the checks found.
     pub fn doubts(&self) -> impl Iterator<Item = Doubt> + '_ {
         let restarted = (0..SEGMENT_COUNT)
-            .filter(|&k| self.restarted >> k & 1 == 1)
-            .map(|k| Doubt::Restarted { sensor: k as u8 });
+            .filter(|&k| (self.restarted | self.spoiled) >> k & 1 == 1)
+            .map(|k| Doubt::Restarted {
+                sensor: k as u8,
+                spoils: self.spoiled >> k & 1 == 1,
+            });
         let side = (libm::fabsf(self.x_up) < UP || self.x_up.is_nan())
             .then_some(Doubt::Side { up: self.x_up });
         let unclear = Finger::ALL.into_iter().filter_map(|finger| {
@@ -304,10 +312,14 @@ impl core::fmt::Display for Doubt {
         let name = |segment: u8| SEGMENT_NAMES.get(usize::from(segment)).unwrap_or(&"?");
         let deg = |by: f32| by.to_degrees();
         match *self {
-            Doubt::Restarted { sensor } => write!(
-                f,
-                "sensor {sensor} started anew in the session: its heading is lost; begin again"
-            ),
+            Doubt::Restarted { sensor, spoils } => {
+                write!(f, "sensor {sensor} started anew in the session: ")?;
+                f.write_str(if spoils {
+                    "its heading is lost; begin again"
+                } else {
+                    "its new heading is known by the last flat pose alone"
+                })
+            }
             Doubt::Unclear { finger, sensors } => write!(
                 f,
                 "{sensors} sensors moved with the {}, 3 sit on it: bend the fingers again, one by one",

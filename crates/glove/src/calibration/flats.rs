@@ -26,6 +26,13 @@ impl Flat {
         }
     }
 
+    /// Leaves sensor `k` out.
+    pub fn forget(&mut self, k: usize) {
+        if let Some(sum) = self.sums.get_mut(k) {
+            *sum = Raw::new(0.0, 0.0, 0.0, 0.0);
+        }
+    }
+
     /// The mean of sensor `k`; `None` without a sample.
     pub fn mean(&self, k: usize) -> Option<Quaternion> {
         algebra::normalised(*self.sums.get(k)?)

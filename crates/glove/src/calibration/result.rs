@@ -1,6 +1,7 @@
 //! The end of a session: profile, headings, checks.
 
 use super::algebra::{self, between, up_in};
+use super::flats::Flat;
 use super::solve::{self, Geometry, is_base, is_thumb};
 use super::{Checks, Profile, Session, Side};
 use crate::hand::{self, Quaternion, SEGMENT_COUNT};
@@ -10,7 +11,7 @@ use crate::hand::{self, Quaternion, SEGMENT_COUNT};
 pub struct Outcome {
     /// The glove on this hand.
     pub profile: Profile,
-    /// By segment, against the hand's, radians: of the turn.
+    /// By segment, against the hand's, radians: of the turn; of the last flat pose for a sensor that started anew between them.
     pub headings: [f32; SEGMENT_COUNT],
     /// Mean orientation of each segment's sensor in the last flat pose: what the headings are brought up to date with.
     pub last_flat: [Quaternion; SEGMENT_COUNT],
@@ -74,10 +75,11 @@ impl Session {
             .seats
             .map(|sensor| algebra::wrap(by_sensor[usize::from(sensor)] - of_hand));
         let moments = self.moments();
-        let solve = |flats| solve::geometry(flats, &self.seats, &headings, &moments);
+        let solve = |flats: &[_]| solve::geometry(flats, &self.seats, &headings, &moments);
         let missing = Unfinished::NoSamples { sensor: 0 };
         let early = solve(before).ok_or(missing)?;
-        let all = solve(&self.flats).ok_or(missing)?;
+        let all = solve(&self.flats_of_one_heading()).ok_or(missing)?;
+        let headings = self.renewed(&early, &headings, &last_flat);
         let checks = self.checks(&early, &all, &headings, &last_flat);
         let thumb_base = all.thumb_base();
         let (mounting, axes) = all.with_thumb(&thumb_base);
@@ -98,6 +100,43 @@ impl Session {
             last_flat,
             checks,
         })
+    }
+
+    /// The flat poses, without what sensors said in the last one that had started anew.
+    fn flats_of_one_heading(&self) -> [Flat; 3] {
+        let mut flats = self.flats;
+        let [.., last] = &mut flats;
+        for k in (0..SEGMENT_COUNT).filter(|k| self.restarted >> k & 1 == 1) {
+            if usize::from(self.seats[0]) == k {
+                // All mountings are against the hand's.
+                *last = Flat::new();
+            }
+            last.forget(k);
+        }
+        flats
+    }
+
+    /// The headings, by the last flat pose those of sensors that had started anew.
+    fn renewed(
+        &self,
+        early: &Geometry,
+        headings: &[f32; SEGMENT_COUNT],
+        last: &[Quaternion; SEGMENT_COUNT],
+    ) -> [f32; SEGMENT_COUNT] {
+        let is_new = |k: usize| self.restarted >> self.seats[k] & 1 == 1;
+        let segments = flat_segments(early, headings, last);
+        let mut renewed = *headings;
+        for (k, heading) in renewed.iter_mut().enumerate().skip(1) {
+            // A sensor that kept its heading keeps it against a hand that did, too: else its finger's base shows by how much.
+            let shown_by = match (is_new(k), is_new(0)) {
+                (false, false) => continue,
+                (true, _) => k,
+                (false, true) => hand::first_segment((k - 1) / 3),
+            };
+            let off = segments[shown_by] * segments[0].inverse();
+            *heading = algebra::wrap(*heading + algebra::about_up(off.w, off.k));
+        }
+        renewed
     }
 
     /// `early`: by the flat poses before the last.
@@ -130,11 +169,9 @@ impl Session {
             innovation: [0.0; SEGMENT_COUNT],
             flat_angle: [0.0; SEGMENT_COUNT],
             restarted: self.restarted,
+            spoiled: self.spoiled,
         };
-        let segments: [Quaternion; SEGMENT_COUNT] = core::array::from_fn(|k| {
-            let turned = algebra::turned_back(algebra::half(headings[k]), &last[k]);
-            turned * early.mounting[k].inverse()
-        });
+        let segments = flat_segments(early, headings, last);
         checks.tilt[0] = between(up_in(&segments[0]), algebra::Y);
         for k in 1..SEGMENT_COUNT {
             let parent = &segments[hand::parent(k).unwrap_or(0)];
@@ -147,6 +184,18 @@ impl Session {
         }
         checks
     }
+}
+
+/// The segments in the last flat pose, by the poses before.
+fn flat_segments(
+    early: &Geometry,
+    headings: &[f32; SEGMENT_COUNT],
+    last: &[Quaternion; SEGMENT_COUNT],
+) -> [Quaternion; SEGMENT_COUNT] {
+    core::array::from_fn(|k| {
+        let turned = algebra::turned_back(algebra::half(headings[k]), &last[k]);
+        turned * early.mounting[k].inverse()
+    })
 }
 
 /// The largest angle of the joint between a finger's segment and its parent.
