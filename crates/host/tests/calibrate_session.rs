@@ -92,14 +92,6 @@ fn golden_sessions_agree_with_the_reference() {
         let rms = rms(&angles_csv(&recorded, &replay), &truth, from);
         let shown = |values: [f64; 9]| values.map(|v| format!("{v:.2}")).join(" ");
         println!("{name}: {}\n   reference {}", shown(rms), shown(reference));
-        println!(
-            "   poses {:?}",
-            Report::of(&replay)
-                .flat_poses
-                .iter()
-                .map(|p| (p.at_s, p.off_max_deg))
-                .collect::<Vec<_>>()
-        );
         for (c, (ours, theirs)) in rms.into_iter().zip(reference).enumerate() {
             assert!(
                 (ours - theirs).abs() <= AGREES,
@@ -190,4 +182,70 @@ fn the_table_has_the_truths_columns_and_a_row_a_scan() {
     let empty = format!("{}{}", recorded.rows[0].time, ",".repeat(JOINT_COUNT));
     assert_eq!(angles.lines().nth(1), Some(empty.as_str()));
     assert_eq!(JOINT_NAMES.len(), JOINT_COUNT);
+}
+
+/// The same session in a mirror: each component about y and z turned round.
+fn mirrored(recorded: &Recorded) -> Recorded {
+    let mut mirrored = recorded.clone();
+    for read in mirrored
+        .rows
+        .iter_mut()
+        .flat_map(|row| row.reads.iter_mut().flatten())
+    {
+        for pair in read.chunks_mut(2).skip(2) {
+            let count = i16::from_le_bytes([pair[0], pair[1]]);
+            pair.copy_from_slice(&count.saturating_neg().to_le_bytes());
+        }
+    }
+    mirrored
+}
+
+/// The same session with each segment's sensor wired as `wires` says.
+fn rewired(recorded: &Recorded, wires: &[usize; 16]) -> Recorded {
+    let mut rewired = recorded.clone();
+    for (row, before) in rewired.rows.iter_mut().zip(&recorded.rows) {
+        for (segment, &wire) in wires.iter().enumerate() {
+            row.reads[wire] = before.reads[segment];
+        }
+    }
+    rewired
+}
+
+#[test]
+fn in_a_mirror_a_right_hand_is_a_left_one_with_the_same_angles() {
+    let Some((recorded, right, _)) = session("b_anatomical") else {
+        return;
+    };
+    let left = replay(&mirrored(&recorded), Config::default()).expect("a calibration");
+    assert_eq!(left.outcome.profile.side, Side::Left);
+    assert!(left.outcome.checks.x_up <= -0.96);
+    assert!(left.outcome.checks.thumb_y > 0.0 && right.outcome.checks.thumb_y < 0.0);
+    for (a, b) in left
+        .readings
+        .iter()
+        .flatten()
+        .zip(right.readings.iter().flatten())
+    {
+        for (a, b) in a.angles.iter().zip(&b.angles) {
+            assert!((a - b).abs().to_degrees() < 0.5, "{a} {b}");
+        }
+    }
+}
+
+#[test]
+fn each_of_the_120_swaps_of_two_sensors_is_named() {
+    let Some((recorded, ..)) = session("b_anatomical") else {
+        return;
+    };
+    for b in 1..16 {
+        for a in 0..b {
+            let mut wires = std::array::from_fn(|k| k);
+            wires.swap(a, b);
+            let swapped = rewired(&recorded, &wires);
+            let replay = replay(&swapped, Config::default()).expect("a calibration");
+            let report = Report::of(&replay);
+            assert_eq!(report.identity.swapped, [[a as u8, b as u8]]);
+            assert_eq!(replay.outcome.profile.sensors.map(usize::from), wires);
+        }
+    }
 }
