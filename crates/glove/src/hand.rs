@@ -13,7 +13,7 @@ use nalgebra::UnitQuaternion;
 pub mod beyond;
 mod calibration;
 pub mod flat;
-mod rotation;
+pub(crate) mod rotation;
 
 pub use calibration::Calibration;
 
@@ -125,7 +125,7 @@ pub enum Side {
 
 impl Side {
     /// Sign of abduction and twist in the rotation.
-    const fn sign(self) -> f32 {
+    pub(crate) const fn sign(self) -> f32 {
         match self {
             Side::Right => 1.0,
             Side::Left => -1.0,
@@ -134,12 +134,12 @@ impl Side {
 }
 
 /// First segment of finger `0` (thumb) to `4` (little); the next two follow it.
-const fn first_segment(finger: usize) -> usize {
+pub(crate) const fn first_segment(finger: usize) -> usize {
     1 + 3 * finger
 }
 
 /// First joint angle of finger `0` (thumb) to `4` (little); the next four follow it.
-const fn first_joint(finger: usize) -> usize {
+pub(crate) const fn first_joint(finger: usize) -> usize {
     5 * finger
 }
 

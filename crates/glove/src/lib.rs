@@ -10,7 +10,9 @@
 //! | [`mux`] | which channel is connected |
 //! | [`imu`] | the sensor's registers, its bring-up, and what a bad sample looks like |
 //! | [`scan`] | all 16 sensors: brings them up, reads them round and round, says how each one is |
-//! | [`hand`] | 25 joint angles ↔ 16 orientations, limits, calibration |
+//! | [`hand`] | 25 joint angles ↔ 16 orientations, limits, calibration on a flat pose |
+//! | [`calibration`] | the guided session: how sensors sit and joints turn, which sensor is where, which hand it is |
+//! | [`headings`] | drift kept out of the joint angles while the hand works; restarts; flat poses |
 //!
 //! Nothing here blocks, allocates or reads a clock: time comes in as an argument. The one exception is
 //! [`sc18im::Blocking`], a wrapper for tools that want a blocking `embedded-hal` `I2c`.
@@ -18,7 +20,9 @@
 #![forbid(unsafe_code)]
 
 pub mod bus;
+pub mod calibration;
 pub mod hand;
+pub mod headings;
 pub mod imu;
 pub mod mux;
 pub mod sc18im;

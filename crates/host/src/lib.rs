@@ -5,6 +5,7 @@
 //! | [`lines`], [`probe`] | serial ports, Modbus TCP; does the right device answer there? |
 //! | [`session`] | a bridge that is driven and watched, in this process or on a chip |
 //! | [`recording`] | the session log |
+//! | [`calibration`] | a glove calibrated from a recorded session |
 //! | [`training`] | maps of hands, and of other domains, from files |
 //! | [`chip`] | the host protocol, and the emulator |
 //! | [`diagnose`] | what is wrong with a line, and what to do |
@@ -21,6 +22,7 @@
 #![doc = include_str!("../examples/follow.rs")]
 //! ```
 
+pub mod calibration;
 pub mod chip;
 pub mod clock;
 pub mod diagnose;

@@ -23,7 +23,7 @@ pub(super) fn compose(flexion: f32, abduction: f32, twist: f32) -> Quaternion {
 /// With R = R_x(a) R_y(b) R_z(c), the first row is (cos b cos c, −cos b sin c, sin b) and the last column is
 /// (sin b, −sin a cos b, cos a cos b). Near |b| = π/2 both a and c lose their meaning alone; c is therefore read from
 /// the rows turned back by the very a that is returned, and the three angles compose to R even there.
-pub(super) fn decompose(rotation: &Quaternion) -> [f32; 3] {
+pub(crate) fn decompose(rotation: &Quaternion) -> [f32; 3] {
     let q = rotation.quaternion();
     let (w, x, y, z) = (q.w, q.i, q.j, q.k);
     let r02 = 2.0 * (x * z + w * y);
@@ -35,13 +35,12 @@ pub(super) fn decompose(rotation: &Quaternion) -> [f32; 3] {
     let r21 = 2.0 * (y * z + w * x);
     let cos_b = libm::sqrtf(r12 * r12 + r22 * r22);
     // Below this the last column is rounding error (a sensor's step is 2⁻¹⁴): no flexion can be read from it.
-    let a = if cos_b < 1e-5 {
-        0.0
+    let (a, sin_a, cos_a) = if cos_b < 1e-5 {
+        (0.0, 0.0, 1.0)
     } else {
-        libm::atan2f(-r12, r22)
+        (libm::atan2f(-r12, r22), -r12 / cos_b, r22 / cos_b)
     };
     let b = libm::atan2f(r02, cos_b);
-    let (sin_a, cos_a) = libm::sincosf(a);
     let c = libm::atan2f(cos_a * r10 + sin_a * r20, cos_a * r11 + sin_a * r21);
     [a, b, c]
 }
@@ -54,4 +53,16 @@ pub(super) fn twist_about_x(rotation: &Quaternion) -> f32 {
     // q and −q are one rotation; the half with w ≥ 0 keeps the angle within half a turn.
     let (w, x) = if q.w < 0.0 { (-q.w, -q.i) } else { (q.w, q.i) };
     2.0 * libm::atan2f(x, w)
+}
+
+/// The twist about the unit vector `axis` of a rotation, radians in (−π, π]: [`twist_about_x`] about any axis.
+pub(crate) fn twist_about(rotation: &Quaternion, axis: [f32; 3]) -> f32 {
+    let q = rotation.quaternion();
+    let along = q.i * axis[0] + q.j * axis[1] + q.k * axis[2];
+    let (w, along) = if q.w < 0.0 {
+        (-q.w, -along)
+    } else {
+        (q.w, along)
+    };
+    2.0 * libm::atan2f(along, w)
 }
