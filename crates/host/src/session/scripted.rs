@@ -10,11 +10,11 @@ use bridge::calibration::{CalibrationState, Try};
 use bridge::clutch::{HeartbeatRefusal, Position};
 use bridge::protocol::frame::{self, Decoder};
 use bridge::protocol::message::{
-    Answer, Call, Counters, FromBridge, GripperStatus, Health, Hello, PerAxis, Refusal, Reply,
-    Request, Restart, Sample, Status, VERSION,
+    Answer, AxisDetail, Call, Counters, Devices, FromBridge, GripperDetail, GripperStatus, Health,
+    Hello, PerAxis, Refusal, Replies, Reply, Request, Restart, Sample, Status, VERSION,
 };
 use bridge::{Epoch, HoldReason, State};
-use gripper::{Activation, Fault};
+use gripper::{Activation, Contact, Fault};
 
 use crate::chip::link::Address;
 
@@ -113,6 +113,28 @@ impl Script {
         }
     }
 
+    fn devices(&self) -> Devices {
+        let axis = AxisDetail {
+            contact: Contact::Moving,
+            current: 0,
+        };
+        Devices {
+            now_us: self.now_us(),
+            glove_age_ms: Some(0),
+            missing: 0,
+            sensors: Default::default(),
+            distrusted: 0,
+            impossible: 0,
+            gripper: self.gripper.map(|axes| GripperDetail {
+                age_ms: 0,
+                going_to: true,
+                axes: axes.iter().map(|_| axis).collect(),
+            }),
+            stands: None,
+            replies: Replies::default(),
+        }
+    }
+
     fn answer(&mut self, call: &Call<'_>) -> Result<Answer, Refusal> {
         let name = format!("{call:?}");
         let name = name.split([' ', '(']).next().unwrap().to_owned();
@@ -121,7 +143,7 @@ impl Script {
         }
         if !matches!(
             call,
-            Call::Heartbeat { .. } | Call::Status | Call::Counters | Call::Health
+            Call::Heartbeat { .. } | Call::Status | Call::Counters | Call::Health | Call::Devices
         ) {
             self.calls.push(name);
         }
@@ -161,6 +183,7 @@ impl Script {
                 Answer::Counters(self.counters)
             }
             Call::Health => Answer::Health(self.health()),
+            Call::Devices => Answer::Devices(self.devices()),
             _ => Answer::Done,
         })
     }
