@@ -187,9 +187,7 @@ fn another_encoding_is_refused_by_its_name_with_the_way_out() {
         (&[], true),
         (&[], false),
     ] {
-        let said = read(&[mark, &wide(little)].concat())
-            .unwrap_err()
-            .told();
+        let said = read(&[mark, &wide(little)].concat()).unwrap_err().told();
         assert!(
             said.contains("UTF-16") && said.contains("UTF-8") && said.contains("iconv -f UTF-16"),
             "{said}"
