@@ -107,7 +107,8 @@ pub(super) fn status<B: Board<X>, const X: usize>(app: &App<B, X>) -> Status {
     }
 }
 
-/// How its glove and gripper are.
+/// How its glove and gripper are. Out of line: what it needs of the stack is then needed only while it is asked.
+#[inline(never)]
 pub(super) fn devices<B: Board<X>, const X: usize>(app: &App<B, X>) -> Devices {
     let seen = app.telemetry();
     let age_ms = |stamp: Instant| {
@@ -121,7 +122,7 @@ pub(super) fn devices<B: Board<X>, const X: usize>(app: &App<B, X>) -> Devices {
     Devices {
         now_us: seen.now.as_ticks(),
         glove_age_ms: newest.filter(|stamp| stamp.as_ticks() > 0).map(age_ms),
-        missing: seen.frame.map_or(0, |frame| !frame.good()),
+        missing: seen.frame.as_ref().map_or(0, |frame| !frame.good()),
         sensors: (0..)
             .zip(samples)
             .filter(|(_, sample)| !sample.health.is_good())

@@ -15,6 +15,9 @@ const BAD_MAX: u8 = 3;
 /// Rechecks in a row without a good sample after which it is brought up again.
 const RECHECKS_MAX: u8 = 3;
 
+/// A time at which nothing was asked.
+const NEVER: Instant = Instant::from_ticks(0);
+
 /// One sensor.
 #[derive(Debug, Clone)]
 pub(super) struct Sensor {
@@ -39,10 +42,10 @@ pub(super) struct Sensor {
     good: Option<(Quaternion, Instant)>,
     /// Nobody looked at any sensor for a while, and until then it was good: it was not away.
     unseen: bool,
-    /// When it was last asked, since it came up or was checked.
-    asked: Option<Instant>,
-    /// The longest gap between two questions since the last good sample, where it was longer than a scan takes.
-    gap: Option<Duration>,
+    /// When it was last asked since it came up or was checked; zero before.
+    asked: Instant,
+    /// The longest gap between two questions since the last good sample, µs, where it was longer than a scan takes; zero without.
+    gap_us: u32,
     suspect: Option<Suspect>,
     /// Good samples since it came up.
     fresh: bool,
@@ -68,8 +71,8 @@ impl Sensor {
             returned: None,
             good: None,
             unseen: false,
-            asked: None,
-            gap: None,
+            asked: NEVER,
+            gap_us: 0,
             suspect: None,
             fresh: false,
             up_since: Instant::from_ticks(0),
@@ -108,9 +111,11 @@ impl Sensor {
 
     /// It is asked at `stamp`. More than `longest` since it was asked before: the scans have a gap.
     pub fn ask(&mut self, stamp: Instant, longest: Duration) {
-        let pause = self.asked.replace(stamp).map(|before| since(stamp, before));
-        if let Some(pause) = pause.filter(|pause| *pause > longest) {
-            self.gap = self.gap.max(Some(pause));
+        let before = core::mem::replace(&mut self.asked, stamp);
+        let pause = since(stamp, before);
+        if before != NEVER && pause > longest {
+            let us = u32::try_from(pause.as_ticks()).unwrap_or(u32::MAX);
+            self.gap_us = self.gap_us.max(us);
         }
     }
 
@@ -140,7 +145,7 @@ impl Sensor {
                     None => orientation,
                 };
                 self.good = Some((orientation, stamp));
-                (self.fresh, self.unseen, self.gap) = (true, false, None);
+                (self.fresh, self.unseen, self.gap_us) = (true, false, 0);
                 self.distrusted = None;
                 self.health = Health::Good;
                 (self.bad, self.rechecks, self.failures, self.tries) = (0, 0, 0, 0);
@@ -208,12 +213,10 @@ impl Sensor {
     fn doubts(&self, by: f32, elapsed: Duration) -> Option<Cause> {
         let was_away = !self.fresh || elapsed >= timing::PEAK_SPEED;
         // A gap that takes most of the time explains it; a short one in a long absence does not.
-        let explains = |pause: &Duration| {
-            !was_away || (self.fresh && pause.as_ticks() > elapsed.as_ticks() / 2)
-        };
-        if let Some(pause) = self.gap.filter(explains) {
+        let most = self.fresh && u64::from(self.gap_us) > elapsed.as_ticks() / 2;
+        if self.gap_us > 0 && (!was_away || most) {
             return (by > AGREE_WITHIN).then(|| Cause::Gap {
-                pause,
+                pause_us: self.gap_us,
                 beyond: by > imu::reach_over_gap(elapsed),
                 joined: false,
             });
@@ -292,7 +295,7 @@ impl Sensor {
     }
 
     fn recheck(&mut self, error: Error, now: Instant) {
-        self.asked = None;
+        self.asked = NEVER;
         self.bad = 0;
         self.rechecks = self.rechecks.saturating_add(1);
         if self.rechecks > RECHECKS_MAX {
@@ -318,7 +321,7 @@ impl Sensor {
         self.failures = self.failures.saturating_add(1);
         (self.step, self.due) = (Some(Step::Identify), after(now, wait));
         (self.tries, self.bad, self.rechecks, self.tried) = (0, 0, 0, true);
-        self.asked = None;
+        self.asked = NEVER;
         self.forget();
     }
 

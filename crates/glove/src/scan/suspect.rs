@@ -1,6 +1,5 @@
 //! A sensor that is far from where it was: why, and what must come before it is believed there.
 
-use crate::Duration;
 use crate::hand::Quaternion;
 use crate::imu::{self, Fault};
 
@@ -20,8 +19,8 @@ pub(super) enum Cause {
     Away,
     /// Nobody asked any sensor for a while.
     Gap {
-        /// The longest time between two questions.
-        pause: Duration,
+        /// The longest time between two questions, µs.
+        pause_us: u32,
         /// It turned farther than a hand does in the time since its last good sample.
         beyond: bool,
         /// A segment beside it went along.

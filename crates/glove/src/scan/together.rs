@@ -79,7 +79,7 @@ impl<B> BusScanner<B> {
     /// Those that jumped are told one by one; those that were away, and those of a gap, together.
     fn tell_returns(&mut self) {
         let (mut away, mut after) = (Together::default(), Together::default());
-        let mut gap = Duration::from_ticks(0);
+        let mut gap_us = 0;
         for k in 0..self.sensors.len() {
             let Some(Return { by, cause }) =
                 self.sensors.get_mut(k).and_then(|s| s.returned.take())
@@ -89,12 +89,12 @@ impl<B> BusScanner<B> {
             match cause {
                 Cause::Away => away.add(k, by),
                 Cause::Gap {
-                    pause,
+                    pause_us,
                     beyond,
                     joined,
                 } if joined || !beyond => {
                     after.add(k, by);
-                    gap = gap.max(pause);
+                    gap_us = gap_us.max(pause_us);
                 }
                 Cause::Jump | Cause::Gap { .. } => {
                     self.counters.jumps = self.counters.jumps.wrapping_add(1);
@@ -117,6 +117,7 @@ impl<B> BusScanner<B> {
             by,
         } = after
         {
+            let gap = Duration::from_ticks(gap_us.into());
             self.tell(Finding::AfterGap { segments, by, gap });
         }
     }
