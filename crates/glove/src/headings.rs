@@ -414,3 +414,6 @@ fn angles_of(segment: usize) -> u32 {
     let within: u32 = [0b111, 0b0_1000, 0b1_0000][behind % 3];
     within << hand::first_joint(behind / 3)
 }
+
+#[cfg(test)]
+mod tests;

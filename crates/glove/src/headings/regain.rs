@@ -91,7 +91,7 @@ impl Regain {
             if joint.known || joint.kind != Kind::Hinge || self.follows(k).is_some() {
                 continue;
             }
-            let Some(look) = look(k) else {
+            let Some(look) = look(k).filter(|look| look.seen.is_finite()) else {
                 self.looks[k] = None;
                 continue;
             };
