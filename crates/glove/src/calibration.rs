@@ -269,7 +269,7 @@ impl Session {
         };
         let before = core::mem::replace(&mut self.seats, seats);
         for k in 1..SEGMENT_COUNT {
-            let parent = hand::parent(k).unwrap_or(0);
+            let parent = hand::parent(k).unwrap_or(0) % SEGMENT_COUNT;
             if before[k] != seats[k] || before[parent] != seats[parent] {
                 // These sums are of two sensors that are not neighbours.
                 self.alone[k] = Moments::new();

@@ -220,15 +220,14 @@ impl Headings {
         } else {
             PAUSE_MAX
         };
-        let (axes, look_at) = (self.axes, |k: usize| is_there(good, k));
+        let axes = self.axes;
         let look = |k: usize| {
-            let parent = hand::parent(k).unwrap_or(0);
-            look_at(k).then(|| {
-                Look::new(
-                    algebra::rotate(&q[parent], axes[k][0]),
-                    algebra::rotate(&q[k], axes[k][1]),
-                )
-            })
+            let [of_parent, own] = *axes.get(k).filter(|_| is_there(good, k))?;
+            let parent = q.get(hand::parent(k).unwrap_or(0))?;
+            Some(Look::new(
+                algebra::rotate(parent, of_parent),
+                algebra::rotate(q.get(k)?, own),
+            ))
         };
         self.turn = (self.turn + 1) % SPREAD;
         for k in 1..SEGMENT_COUNT {
@@ -268,7 +267,8 @@ impl Headings {
         if kind(k) != Kind::Mcp {
             return 0.0;
         }
-        let angle = self.angles[hand::first_joint((k - 1) / 3)];
+        let joint = hand::first_joint((k - 1) / 3);
+        let angle = self.angles.get(joint).copied().unwrap_or(0.0);
         // Bhaskara's sine is within 0.002: the variance of a look needs no more, and it costs a division.
         let a = libm::fabsf(angle);
         let b = a * (core::f32::consts::PI - a);
@@ -316,21 +316,27 @@ impl Headings {
             if held & angles_of(k) != 0 {
                 continue;
             }
-            let parent = segments[hand::parent(k).unwrap_or(0)].inverse();
+            let parent = segments[hand::parent(k).unwrap_or(0) % SEGMENT_COUNT].inverse();
             let first = hand::first_joint((k - 1) / 3);
             if is_base(k) {
                 let back = self.profile.thumb_base.inverse();
                 let parent = if k == 1 { back * parent } else { parent };
                 let [flexion, abduction, twist] =
                     hand::rotation::decompose(&(parent * segments[k]));
-                self.angles[first] = flexion;
-                self.angles[first + 1] = sign * abduction;
-                self.angles[first + 2] = sign * twist;
+                self.put(first, flexion);
+                self.put(first + 1, sign * abduction);
+                self.put(first + 2, sign * twist);
             } else {
                 let relative = parent * segments[k];
-                self.angles[first + 2 + (k - 1) % 3] =
-                    hand::rotation::twist_about(&relative, self.profile.axes[k]);
+                let angle = hand::rotation::twist_about(&relative, self.profile.axes[k]);
+                self.put(first + 2 + (k - 1) % 3, angle);
             }
+        }
+    }
+
+    fn put(&mut self, joint: usize, angle: f32) {
+        if let Some(place) = self.angles.get_mut(joint) {
+            *place = angle;
         }
     }
 
@@ -408,3 +414,6 @@ fn angles_of(segment: usize) -> u32 {
     let within: u32 = [0b111, 0b0_1000, 0b1_0000][behind % 3];
     within << hand::first_joint(behind / 3)
 }
+
+#[cfg(test)]
+mod tests;

@@ -1,7 +1,7 @@
 //! Calibrating a glove on the host: the same code as the product's, for a session on a wire or in files.
 //!
-//! What decides lies in [`glove::calibration`] and [`glove::headings`]. Here is how a session in files is read ([`recorded`]), run
-//! ([`replay`]), and told ([`report`]).
+//! What decides lies in [`glove::calibration`] and [`glove::headings`]. Here is how a session in files is read ([`mod@recorded`]), run
+//! ([`mod@replay`]), and told ([`mod@report`]).
 
 pub mod recorded;
 pub mod replay;

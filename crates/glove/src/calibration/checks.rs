@@ -202,7 +202,7 @@ impl Checks {
             let Identity::Unclear(counts) = self.identity else {
                 return None;
             };
-            let sensors = counts[finger.number()];
+            let sensors = counts.get(finger.number()).copied()?;
             (sensors != 3).then_some(Doubt::Unclear { finger, sensors })
         });
         restarted
@@ -212,6 +212,7 @@ impl Checks {
     }
 
     fn of_segment(&self, k: usize) -> [Option<Doubt>; 8] {
+        let k = k % SEGMENT_COUNT;
         let segment = k as u8;
         let elsewhere = match self.identity {
             Identity::Moved(sensors) if usize::from(sensors[k]) != k => Some(Doubt::Elsewhere {

@@ -106,7 +106,7 @@ impl Paths {
         if of == k || of >= SEGMENT_COUNT || k >= SEGMENT_COUNT {
             return [0.0; FINGERS];
         }
-        let own = self.pairs[pair(of, k)];
+        let own = self.pairs.get(pair(of, k)).copied().unwrap_or_default();
         let least = own.iter().copied().fold(f32::INFINITY, f32::min);
         own.map(|path| path - least)
     }
@@ -152,7 +152,8 @@ impl Paths {
             (0..FINGERS).fold(0.0, |sum, finger| {
                 let mut paths = [f32::INFINITY; SEGMENT_COUNT];
                 for (k, path) in paths.iter_mut().enumerate().filter(|(k, _)| *k != of) {
-                    *path = self.pairs[pair(of, k)][finger];
+                    let paths = self.pairs.get(pair(of, k));
+                    *path = paths.map_or(f32::INFINITY, |paths| paths[finger]);
                 }
                 paths.sort_unstable_by(f32::total_cmp);
                 sum + paths[RESTING - 1]

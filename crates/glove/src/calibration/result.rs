@@ -70,10 +70,9 @@ impl Session {
             let mean = last.iter().find_map(|f| f.mean(usize::from(sensor)));
             *own = mean.filter(|_| seen).ok_or(missing)?;
         }
-        let of_hand = by_sensor[usize::from(self.seats[0])];
-        let headings = self
-            .seats
-            .map(|sensor| algebra::wrap(by_sensor[usize::from(sensor)] - of_hand));
+        let of = |sensor: u8| by_sensor[usize::from(sensor) % SEGMENT_COUNT];
+        let of_hand = of(self.seats[0]);
+        let headings = self.seats.map(|sensor| algebra::wrap(of(sensor) - of_hand));
         let moments = self.moments();
         let solve = |flats: &[_]| solve::geometry(flats, &self.seats, &headings, &moments);
         let missing = Unfinished::NoSamples { sensor: 0 };
@@ -131,7 +130,7 @@ impl Session {
             let shown_by = match (is_new(k), is_new(0)) {
                 (false, false) => continue,
                 (true, _) => k,
-                (false, true) => hand::first_segment((k - 1) / 3),
+                (false, true) => hand::first_segment((k - 1) / 3) % SEGMENT_COUNT,
             };
             let off = segments[shown_by] * segments[0].inverse();
             *heading = algebra::wrap(*heading + algebra::about_up(off.w, off.k));

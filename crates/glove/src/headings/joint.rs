@@ -260,6 +260,9 @@ impl Joint {
     /// A flat pose shows the heading `measured`. How far it was off, radians.
     pub fn pose(&mut self, measured: f32, at: Instant) -> f32 {
         let sigma = self.kind.pose();
+        if !measured.is_finite() {
+            return 0.0;
+        }
         if !self.known {
             self.set(measured, sigma, at);
             return 0.0;

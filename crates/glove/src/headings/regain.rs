@@ -66,7 +66,7 @@ impl Regain {
     fn keep(&mut self, joints: &[Joint; SEGMENT_COUNT]) {
         self.kept[0] = Some(0.0);
         for (k, joint) in joints.iter().enumerate().skip(1) {
-            let parent = self.kept[hand::parent(k).unwrap_or(0)];
+            let parent = self.kept[parent(k)];
             if let (Some(parent), true) = (parent, joint.known) {
                 self.kept[k] = Some(algebra::wrap(parent + joint.heading));
             }
@@ -74,6 +74,10 @@ impl Regain {
     }
 
     /// A scan. `look` gives a look at a joint's axis, where both sensors are there.
+    #[allow(
+        clippy::needless_range_loop,
+        reason = "no bounds check is left this way"
+    )]
     pub fn take(
         &mut self,
         joints: &mut [Joint; SEGMENT_COUNT],
@@ -81,12 +85,13 @@ impl Regain {
         at: Instant,
     ) {
         let mut found = false;
-        for (k, joint) in joints.iter_mut().enumerate().skip(1) {
+        for k in 1..SEGMENT_COUNT {
+            let joint = &mut joints[k];
             // One that follows from its neighbours is not looked at.
             if joint.known || joint.kind != Kind::Hinge || self.follows(k).is_some() {
                 continue;
             }
-            let Some(look) = look(k) else {
+            let Some(look) = look(k).filter(|look| look.seen.is_finite()) else {
                 self.looks[k] = None;
                 continue;
             };
@@ -131,13 +136,14 @@ impl Regain {
 
     /// The heading across joint `k` by what the sensors on both sides keep.
     fn follows(&self, k: usize) -> Option<f32> {
-        let parent = self.kept[hand::parent(k)?]?;
-        Some(algebra::wrap(self.kept[k]? - parent))
+        let of = self.kept[parent(k)]?;
+        let own = (*self.kept.get(k)?)?;
+        Some(algebra::wrap(own - of))
     }
 
     /// The heading across joint `k` is known: one of its sensors says where the other is.
     fn connect(&mut self, k: usize, heading: f32) {
-        let parent = hand::parent(k).unwrap_or(0);
+        let (k, parent) = (k % SEGMENT_COUNT, parent(k));
         match (self.kept[parent], self.kept[k]) {
             (Some(of), None) => self.kept[k] = Some(algebra::wrap(of + heading)),
             (None, Some(of)) => self.kept[parent] = Some(algebra::wrap(of - heading)),
@@ -161,4 +167,9 @@ impl Regain {
             }
         }
     }
+}
+
+/// The segment that `k` hangs on; 0 for the hand.
+fn parent(k: usize) -> usize {
+    hand::parent(k).unwrap_or(0) % SEGMENT_COUNT
 }
