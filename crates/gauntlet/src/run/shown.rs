@@ -12,11 +12,12 @@ use glove::scan::{Finding, Health};
 use gripper::{Activation, Contact};
 
 use crate::live::{Axis, Finger};
+use host::next::Command;
 use host::realtime::Scheduling;
-use host::session::Snapshot;
 use host::session::axes::MOST;
 use host::session::replies::Replies;
 use host::session::snapshot::Status;
+use host::session::{Devices, Snapshot};
 use host::words;
 
 /// Faults shown at once.
@@ -70,7 +71,7 @@ impl Shown {
         &mut self,
         snapshot: &Snapshot,
         scheduling: Option<Scheduling>,
-        hands: Hands,
+        hands: &Hands,
         now: Instant,
     ) -> Vec<String> {
         let mut faults = standing(snapshot, hands);
@@ -201,46 +202,51 @@ fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
 }
 
 /// What whoever watches can do from here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Hands {
     /// Press keys.
     Keys,
     /// Only start the run anew: there is no terminal.
     Options,
-    /// Nothing: the bridge is only watched.
-    None,
+    /// Nothing: the bridge is only watched. The command that calibrates its glove.
+    None(Option<Command>),
 }
 
 impl Hands {
     /// `keys`: they can be pressed; `drives`: they do something.
-    pub(super) fn of(keys: bool, drives: bool) -> Self {
+    pub(super) fn of(keys: bool, drives: bool, devices: &Devices) -> Self {
         match (keys, drives) {
             (true, true) => Self::Keys,
             (false, true) => Self::Options,
-            (_, false) => Self::None,
+            (_, false) => Self::None(devices.bridge("bridge calibrate")),
         }
     }
 
     /// How a glove is calibrated from here, and how the clutch is opened before it.
-    fn calibrate(self, closed: bool) -> &'static str {
+    fn calibrate(&self, closed: bool) -> String {
         match (self, closed) {
-            (Self::Keys, false) => "lay the hand flat and still, press c",
-            (Self::Keys, true) => "open the clutch (space), lay the hand flat and still, press c",
-            (Self::Options, _) => "the same with --calibrate-flat, the hand flat and still",
-            (Self::None, _) => "`gauntlet bridge calibrate` does it",
+            (Self::Keys, false) => "lay the hand flat and still, press c".to_owned(),
+            (Self::Keys, true) => {
+                "open the clutch (space), lay the hand flat and still, press c".to_owned()
+            }
+            (Self::Options, _) => {
+                "the same with --calibrate-flat, the hand flat and still".to_owned()
+            }
+            (Self::None(Some(command)), _) => format!("`{command}` does it"),
+            (Self::None(None), _) => "whoever drives calibrates it".to_owned(),
         }
     }
 
-    fn open(self) -> &'static str {
+    fn open(&self) -> &'static str {
         match self {
             Self::Keys => "open the clutch (space)",
-            Self::Options | Self::None => "open the clutch",
+            Self::Options | Self::None(_) => "open the clutch",
         }
     }
 }
 
 /// What a glove without a calibration needs, and why the newest try was refused.
-fn not_calibrated(snapshot: &Snapshot, hands: Hands) -> Option<String> {
+fn not_calibrated(snapshot: &Snapshot, hands: &Hands) -> Option<String> {
     let closed = matches!(snapshot.clutch, Position::Closed | Position::Lost);
     let calibrate = hands.calibrate(closed);
     match snapshot.calibration.newest {
@@ -255,7 +261,7 @@ fn not_calibrated(snapshot: &Snapshot, hands: Hands) -> Option<String> {
 }
 
 /// What is wrong now and stays so.
-fn standing(snapshot: &Snapshot, hands: Hands) -> Vec<String> {
+fn standing(snapshot: &Snapshot, hands: &Hands) -> Vec<String> {
     let mut faults = Vec::new();
     match snapshot.state {
         State::Holding(HoldReason::NotCalibrated) if snapshot.lacks_calibration() => {
@@ -358,30 +364,34 @@ mod tests {
 
     #[test]
     fn a_glove_that_is_not_calibrated_is_said_with_what_this_person_can_do() {
+        let chip = Devices::Chip("/dev/ttyACM0".parse().unwrap());
         let idle = uncalibrated(Position::Open, State::Idle);
         for (hands, words) in [
             (Hands::Keys, "press c"),
             (Hands::Options, "--calibrate-flat"),
-            (Hands::None, "gauntlet bridge calibrate"),
+            (
+                Hands::of(true, false, &chip),
+                "gauntlet bridge calibrate --bridge /dev/ttyACM0",
+            ),
         ] {
-            let told = standing(&idle, hands).join("; ");
+            let told = standing(&idle, &hands).join("; ");
             assert!(
                 told.starts_with("not calibrated: ") && told.contains(words),
                 "{told}"
             );
         }
         let held = State::Holding(HoldReason::NotCalibrated);
-        let told = standing(&uncalibrated(Position::Closed, held), Hands::Keys).join("; ");
+        let told = standing(&uncalibrated(Position::Closed, held), &Hands::Keys).join("; ");
         assert!(told.contains("open the clutch (space)"), "{told}");
         let mut calibrated = idle;
         calibrated.calibration.is_calibrated = true;
-        assert!(standing(&calibrated, Hands::Keys).is_empty());
+        assert!(standing(&calibrated, &Hands::Keys).is_empty());
         // A bridge of an older version never says.
         let unknown = Snapshot {
             calibration_known: false,
             ..idle
         };
-        assert!(standing(&unknown, Hands::None).is_empty());
+        assert!(standing(&unknown, &Hands::None(None)).is_empty());
     }
 
     #[test]
@@ -392,7 +402,7 @@ mod tests {
             by: 0.3,
         });
         snapshot.calibration.newest = refused;
-        let told = standing(&snapshot, Hands::Keys).join("; ");
+        let told = standing(&snapshot, &Hands::Keys).join("; ");
         assert!(
             told.contains("index_proximal") && told.contains("press c"),
             "{told}"

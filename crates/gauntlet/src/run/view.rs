@@ -29,7 +29,10 @@ impl Run {
             latency_p50: progress.latency_p50,
             latency_p99: progress.latency_p99,
             dropped: progress.dropped,
-            faults: self.faults_now(snapshot.as_ref(), Hands::of(keys, options.drives)),
+            faults: self.faults_now(
+                snapshot.as_ref(),
+                &Hands::of(keys, options.drives, &self.devices),
+            ),
             gripper_faults: progress.gripper_faults,
             keys: match (keys, options.drives) {
                 (true, true) => {
@@ -67,7 +70,7 @@ impl Run {
         name.to_owned()
     }
 
-    fn faults_now(&mut self, snapshot: Option<&Snapshot>, hands: Hands) -> Vec<String> {
+    fn faults_now(&mut self, snapshot: Option<&Snapshot>, hands: &Hands) -> Vec<String> {
         let mut faults = Vec::new();
         for (device, port) in self.session.ports() {
             if !port.plugged() {
