@@ -61,7 +61,7 @@ pub fn line(verb: &'static str, value: impl Serialize) -> String {
 /// Prints why there is no result, where none was printed; in one line, as one of many.
 ///
 /// # Errors
-/// As [`print`].
+/// As [`print()`].
 pub fn print_failure(error: &anyhow::Error) -> Result<()> {
     if PRINTED.load(Ordering::Relaxed) {
         return Ok(());
