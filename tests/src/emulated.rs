@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use bridge::State;
 use bridge::calibration::Try;
-use bridge::protocol::message::{Answer, Call, Counters, SlotContents};
+use bridge::protocol::message::{Answer, Call, Counters, Restart, SlotContents};
 use gripper::Activation;
 use host::chip::emulator::{Emulator, Setup};
 use host::chip::link::{Address, Error, Heartbeat, HostLink};
@@ -299,11 +299,11 @@ fn spawn(device: Box<dyn Device>) -> Handle {
 }
 
 /// Sends `bytes` bytes to a bridge whose loop stands still for a moment: its receive queue fills. The bytes lost by the
-/// host's, the glove's and the gripper's port, once the loop goes on.
+/// host's, the glove's and the gripper's port, once the loop goes on; `None` where it stood so long that the watchdog restarted it.
 ///
 /// # Panics
 /// The bridge does not answer then.
-pub fn flood(firmware: &Path, bytes: usize) -> [u32; 3] {
+pub fn flood(firmware: &Path, bytes: usize) -> Option<[u32; 3]> {
     let mut emulator = debugged(firmware);
     drop(emulator.link().expect("a bridge"));
     let Address::Unix(path) = emulator.address() else {
@@ -319,7 +319,8 @@ pub fn flood(firmware: &Path, bytes: usize) -> [u32; 3] {
     debugger::resume(&emulator.debugger(), &hung);
     drop(line);
     let mut link = emulator.link().expect("the bridge answers the next host");
-    link.counters().expect("an answer").bytes_lost
+    let restart = link.health().expect("an answer").restart;
+    (restart == Restart::Power).then(|| link.counters().expect("an answer").bytes_lost)
 }
 
 /// What cutting the power many times came to.

@@ -93,7 +93,12 @@ fn bytes_that_find_the_queue_full_are_counted_and_the_bridge_goes_on() {
     let Some(firmware) = firmware() else { return };
     let _alone = alone();
     let sent = 6_000;
-    let [host, glove, gripper] = flood(&firmware, sent);
+    let Some([host, glove, gripper]) = (0..5).find_map(|_| flood(&firmware, sent)) else {
+        return skipped(
+            Need::Machine,
+            "the chip's loop stood for longer than its watchdog waits",
+        );
+    };
     println!("{sent} bytes to a bridge that takes none: {host} lost");
     // The queue holds 2,048. A machine with much to do may not have delivered all when the loop goes on; on one with
     // little to do the next host's first words still find the queue full.
