@@ -264,10 +264,14 @@ pub fn reach(elapsed: Duration) -> f32 {
     }
 }
 
-/// The same where nobody looked meanwhile: a fast hand goes on as [`FAST`] as that, farther than [`FURTHEST`].
-pub fn reach_over_gap(elapsed: Duration) -> f32 {
-    let (reach, sustained) = (reach(elapsed), FAST * seconds(elapsed));
-    if reach > sustained { reach } else { sustained }
+/// The farthest that one segment turns, and none beside it, where nobody looked for `elapsed`: a single joint's range
+/// ([`FURTHEST`]), and as fast as [`FAST`] in a longer time, in which several may have come and gone.
+pub fn reach_alone(elapsed: Duration) -> f32 {
+    if elapsed < timing::PEAK_SPEED {
+        FURTHEST
+    } else {
+        FAST * seconds(elapsed)
+    }
 }
 
 /// Two reads may see one period of the fusion however close they are.

@@ -15,6 +15,9 @@ const BAD_MAX: u8 = 3;
 /// Rechecks in a row without a good sample after which it is brought up again.
 const RECHECKS_MAX: u8 = 3;
 
+/// A joint seldom turns more than three times as far as the one before it.
+const LEAST_PART: f32 = 3.0;
+
 /// A time at which nothing was asked.
 const NEVER: Instant = Instant::from_ticks(0);
 
@@ -47,6 +50,8 @@ pub(super) struct Sensor {
     /// The longest gap between two questions since the last good sample, µs, where it was longer than a scan takes; zero without.
     gap_us: u32,
     suspect: Option<Suspect>,
+    /// How far it turned in its newest gap, radians, and when it was asked after it.
+    turned: Option<(f32, Instant)>,
     /// Good samples since it came up.
     fresh: bool,
     up_since: Instant,
@@ -74,6 +79,7 @@ impl Sensor {
             asked: NEVER,
             gap_us: 0,
             suspect: None,
+            turned: None,
             fresh: false,
             up_since: Instant::from_ticks(0),
             tries: 0,
@@ -119,18 +125,19 @@ impl Sensor {
         }
     }
 
-    /// Whether it is not believed, for what it did in a gap between scans.
-    pub fn is_suspect_of_a_gap(&self) -> bool {
-        let cause = self.suspect.map(|suspect| suspect.cause);
-        matches!(cause, Some(Cause::Gap { .. }))
+    /// How far it turned in its newest gap between scans, radians, and when it was asked after it: believed or not.
+    pub fn turned_in_gap(&self) -> Option<(f32, Instant)> {
+        self.turned
     }
 
-    /// A segment beside it turned far in the same gap: the hand moved.
-    pub fn went_along(&mut self) {
-        if let Some(Suspect { cause, .. }) = &mut self.suspect
-            && let Cause::Gap { joined, .. } = cause
+    /// A segment beside it turned by so much in a gap, until it was asked at so: where that was the same gap and no small part of
+    /// what this one did, the hand moved.
+    pub fn went_along(&mut self, (by, at): (f32, Instant), longest: Duration) {
+        if let Some(suspect) = &mut self.suspect
+            && let Cause::Gap { joined, .. } = &mut suspect.cause
         {
-            *joined = true;
+            let apart = since(at, suspect.since).max(since(suspect.since, at));
+            *joined |= apart <= longest && by > suspect.by / LEAST_PART;
         }
     }
 
@@ -181,6 +188,9 @@ impl Sensor {
             return Ok(orientation);
         };
         let by = imu::angle_between(&good, &orientation);
+        if self.gap_us > 0 && self.suspect.is_none() {
+            self.turned = Some((by, stamp));
+        }
         if self.unseen && self.suspect.is_none() {
             // The hand may have done anything meanwhile.
             return Ok(orientation);
@@ -189,7 +199,7 @@ impl Sensor {
             let Some(cause) = self.doubts(by, since(stamp, at)) else {
                 return Ok(orientation);
             };
-            let suspect = Suspect::at(orientation, cause);
+            let suspect = Suspect::at(orientation, cause, stamp, by);
             self.suspect = Some(suspect);
             return Err(suspect.fault());
         };
@@ -217,7 +227,7 @@ impl Sensor {
         if self.gap_us > 0 && (!was_away || most) {
             return (by > AGREE_WITHIN).then(|| Cause::Gap {
                 pause_us: self.gap_us,
-                beyond: by > imu::reach_over_gap(elapsed),
+                beyond: by > imu::reach_alone(elapsed),
                 joined: false,
             });
         }

@@ -1,5 +1,6 @@
 //! A sensor that is far from where it was: why, and what must come before it is believed there.
 
+use crate::Instant;
 use crate::hand::Quaternion;
 use crate::imu::{self, Fault};
 
@@ -33,6 +34,10 @@ pub(super) enum Cause {
 pub(super) struct Suspect {
     read: Quaternion,
     agreeing: u8,
+    /// When the first of these reads was asked for.
+    pub since: Instant,
+    /// How far that was from the last good sample, radians.
+    pub by: f32,
     /// Why it is not believed.
     pub cause: Cause,
 }
@@ -47,11 +52,13 @@ pub(super) struct Return {
 }
 
 impl Suspect {
-    /// Its first read there.
-    pub fn at(read: Quaternion, cause: Cause) -> Self {
+    /// Its first read there, asked for at `since`, `by` radians from the last good sample.
+    pub fn at(read: Quaternion, cause: Cause, since: Instant, by: f32) -> Self {
         Self {
             read,
             agreeing: 1,
+            since,
+            by,
             cause,
         }
     }
@@ -72,7 +79,11 @@ impl Suspect {
     /// One more read: it agrees with the one before, or the count begins anew.
     pub fn followed_by(self, read: Quaternion) -> Self {
         if imu::angle_between(&self.read, &read) > AGREE_WITHIN {
-            return Self::at(read, self.cause);
+            return Self {
+                read,
+                agreeing: 1,
+                ..self
+            };
         }
         Self {
             read,

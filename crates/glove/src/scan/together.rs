@@ -1,9 +1,11 @@
 //! What only the sensors together tell, at the end of each scan, and what of it is worth telling a person.
 
+use super::sensor::Sensor;
 use super::suspect::{Cause, Return};
 use super::{BusScanner, FINDINGS_MAX, Finding};
-use crate::hand;
+use crate::hand::{self, SEGMENT_COUNT};
 use crate::imu::Fault;
+use crate::timing;
 use crate::{Duration, Instant};
 
 /// Sensors that are told together.
@@ -50,28 +52,24 @@ impl<B> BusScanner<B> {
                 self.tell(Finding::Frozen { segment: k as u8 });
             }
         }
-        self.compare_neighbours();
+        let longest = timing::scan_gap(self.config.baud, self.config.period);
+        self.compare_neighbours(longest);
         self.tell_returns();
     }
 
-    /// Where a segment and the one beside it turned far in a gap between scans, the hand moved, and neither sensor jumped.
-    fn compare_neighbours(&mut self) {
-        let suspects = self
-            .sensors
-            .iter()
-            .enumerate()
-            .fold(0u16, |mask, (k, sensor)| {
-                mask | u16::from(sensor.is_suspect_of_a_gap()) << k
-            });
-        let joined = (0..self.sensors.len()).fold(0u16, |mask, k| match hand::parent(k) {
-            Some(parent) if suspects >> k & suspects >> parent & 1 == 1 => {
-                mask | 1 << k | 1 << parent
-            }
-            _ => mask,
-        });
-        for (k, sensor) in self.sensors.iter_mut().enumerate() {
-            if joined >> k & 1 == 1 {
-                sensor.went_along();
+    /// Where a segment and the one beside it turned in the same gap between scans, the hand moved, and neither sensor jumped.
+    fn compare_neighbours(&mut self, longest: Duration) {
+        let turned: [_; SEGMENT_COUNT] =
+            core::array::from_fn(|k| self.sensors.get(k).and_then(Sensor::turned_in_gap));
+        for k in 0..SEGMENT_COUNT {
+            let Some(parent) = hand::parent(k) else {
+                continue;
+            };
+            for (one, other) in [(k, parent), (parent, k)] {
+                let along = turned.get(other).copied().flatten();
+                if let (Some(along), Some(sensor)) = (along, self.sensors.get_mut(one)) {
+                    sensor.went_along(along, longest);
+                }
             }
         }
     }
