@@ -7,6 +7,9 @@ use std::time::Duration;
 use bridge::clutch::Position;
 use bridge::{HoldReason, State};
 
+/// Held for so long before it first follows is no fault: frames in a row, a gripper that is looked at.
+const BRING_UP: Duration = Duration::from_secs(2);
+
 /// Where the clutch and the supervisor were at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Moment {
@@ -82,9 +85,10 @@ impl Driven {
         longest.map(|(reason, _)| *reason)
     }
 
-    /// The same, where it was held for longer than it followed.
+    /// The same, where it was held for longer than it followed, [`BRING_UP`] left out: a run that is ended soon has not failed.
     pub fn mostly_held(&self) -> Option<HoldReason> {
-        self.reason().filter(|_| self.held_closed() > self.moving)
+        self.reason()
+            .filter(|_| self.held_closed() > self.moving + BRING_UP)
     }
 }
 
@@ -110,7 +114,7 @@ mod tests {
             held(HoldReason::SensorsLost(1)),
             held(HoldReason::Settling),
             held(HoldReason::SensorsLost(3)),
-            following,
+            held(HoldReason::SensorsLost(3)),
             following,
         ];
         for now in steps {
@@ -118,7 +122,11 @@ mod tests {
         }
         assert_eq!(driven.mostly_held(), Some(HoldReason::SensorsLost(3)));
         driven.pass(SECOND, following, following);
-        assert_eq!(driven.mostly_held(), None, "it followed for as long");
+        assert_eq!(
+            driven.mostly_held(),
+            None,
+            "it followed for as long, but for bringing up"
+        );
     }
 
     #[test]

@@ -115,12 +115,13 @@ fn whatever_held_an_unattended_run_at_its_end_is_named_with_what_helps() {
 fn whatever_held_a_run_for_most_of_the_time_is_named_though_it_followed_at_the_end() {
     for (reason, word) in REASONS {
         let ending = Ending {
-            driven: driven(4, reason, 5),
+            driven: driven(4, reason, 7),
             ..well()
         };
         names(ending, reason, word);
+        // Two seconds are for bringing up.
         let ending = Ending {
-            driven: driven(5, reason, 4),
+            driven: driven(4, reason, 6),
             ..well()
         };
         assert_eq!(told(ending), None, "{reason:?}");

@@ -253,11 +253,11 @@ mod tests {
     use bridge::calibration::Try;
     use bridge::clutch::Position;
 
-    /// A run of 4 s that ends while it follows. Of each 400 ms it was held for 250 ms, until enough frames had come in a row.
+    /// A run of 12 s that ends while it follows. Of each 400 ms it was held for 250 ms, until enough frames had come in a row.
     fn held_in_pieces(totals: Totals) -> anyhow::Result<()> {
         let hub = Hub::default();
         hub.lock().totals = totals;
-        for ms in (0..=4_000).step_by(10) {
+        for ms in (0..=12_000).step_by(10) {
             let state = match ms % 400 {
                 0..250 => State::Holding(HoldReason::Settling),
                 _ => State::Following,
@@ -281,7 +281,7 @@ mod tests {
             Totals::on_chip(&counters, Instant::now()),
         ] {
             let told = held_in_pieces(totals).unwrap_err().to_string();
-            assert!(told.contains("held for 2.5 s of the 4.0 s"), "{told}");
+            assert!(told.contains("held for 7.5 s of the 12.0 s"), "{told}");
             assert!(told.contains("fresh frames in a row"), "{told}");
         }
     }
