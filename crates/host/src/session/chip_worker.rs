@@ -32,6 +32,8 @@ const STATUS_EVERY: Duration = Duration::from_millis(500);
 const TRY_EVERY: Duration = Duration::from_millis(100);
 /// Pause between two looks at the counters.
 const COUNT_EVERY: Duration = Duration::from_secs(1);
+/// Questions for the status without an answer, in a row, after which one is asked as often as it takes.
+const MISSED_STATUSES: u32 = 3;
 /// Heartbeats without an answer, in a row, after which nobody is there: 2 s.
 const MISSED_BEATS: u32 = 20;
 /// Frames between two looks at the counters that say something of the glove.
@@ -66,6 +68,7 @@ pub(super) struct Worker {
     /// The clutch was closed, or the gripper told to activate, by this session.
     touched: bool,
     clutch: Position,
+    /// Heartbeats or, under an open clutch, questions for the status that no answer came to, in a row.
     missed: u32,
     status: Status,
     asked_status: Instant,
@@ -180,9 +183,7 @@ impl Worker {
         }
         let every = self.trying.map_or(STATUS_EVERY, |_| TRY_EVERY);
         if self.epoch.is_none() && self.asked_status.elapsed() >= every {
-            self.asked_status = Instant::now();
-            self.status = self.link.status()?;
-            self.look_at_calibration()?;
+            self.ask_status(begun + HEARTBEAT)?;
         }
         if quiet {
             self.count(begun + HEARTBEAT)?;
@@ -218,7 +219,7 @@ impl Worker {
             }
             Order::Release => {
                 (self.epoch, self.clutch) = (None, Position::Open);
-                self.status = self.link.release()?;
+                (self.status, self.missed) = (self.link.release()?, 0);
             }
             Order::Activate => {
                 self.touched = true;
@@ -248,7 +249,7 @@ impl Worker {
             }
             // Somebody else's release, or their closing, is an act: nothing went wrong.
             Heartbeat::Refused(why) => {
-                self.epoch = None;
+                (self.epoch, self.missed) = (None, 0);
                 self.clutch = match why {
                     HeartbeatRefusal::Expired => Position::Expired,
                     _ => Position::Open,
@@ -266,11 +267,29 @@ impl Worker {
         Ok(())
     }
 
-    fn look_at_calibration(&mut self) -> Result<(), Error> {
-        let now = match self.link.health() {
+    /// Asks under an open clutch where the answer comes by `end`: what was lost is asked for again in the next round, since an
+    /// order to close the clutch grows too old behind one that is waited for.
+    fn ask_status(&mut self, end: Instant) -> Result<(), Error> {
+        let status = match self.missed {
+            MISSED_STATUSES.. => Some(self.link.status()?),
+            _ => self.link.status_by(end)?,
+        };
+        let Some(status) = status else {
+            self.missed += 1;
+            return Ok(());
+        };
+        (self.status, self.missed, self.asked_status) = (status, 0, Instant::now());
+        self.look_at_calibration(end)
+    }
+
+    fn look_at_calibration(&mut self, end: Instant) -> Result<(), Error> {
+        let now = match self.link.health_by(end) {
             // That of an older bridge, which only watches and is flashed, is not known.
             Err(Error::Older { .. }) => return Ok(()),
-            health => health?.calibration,
+            health => match health? {
+                Some(health) => health.calibration,
+                None => return Ok(()),
+            },
         };
         self.calibration_known = true;
         let Some(trying) = &mut self.trying else {

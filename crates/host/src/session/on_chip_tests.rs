@@ -206,3 +206,26 @@ fn a_bridge_that_was_held_all_the_time_makes_a_run_that_has_failed() {
     let told = ending.judge(&Devices::Unknown).unwrap_err().to_string();
     assert!(told.contains("never followed"), "{told}");
 }
+
+/// Until the reply to the next such question is lost.
+fn lose(bridge: &Scripted, question: &'static str) {
+    bridge.script().lost = Some(question);
+    let end = Instant::now() + SOON;
+    while bridge.script().lost.is_some() {
+        assert!(Instant::now() < end, "nobody asks for {question}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_clutch_is_closed_although_the_reply_to_a_question_before_was_lost() {
+    for question in ["Status", "Health"] {
+        let bridge = Scripted::start();
+        let session = watching(&bridge);
+        lose(&bridge, question);
+        assert!(session.order(Order::Engage));
+        std::thread::sleep(Duration::from_millis(600));
+        let clutch = session.snapshot().map(|seen| seen.clutch);
+        assert_eq!(clutch, Some(Position::Closed), "{question}");
+    }
+}

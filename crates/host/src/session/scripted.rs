@@ -38,6 +38,8 @@ pub struct Script {
     pub calibration: CalibrationState,
     /// Calls that are refused, by name.
     pub refused: Option<(&'static str, Refusal)>,
+    /// Call whose next reply is lost on the way, by name.
+    pub lost: Option<&'static str>,
     /// Samples to be sent.
     pub samples: VecDeque<Sample>,
     /// Whether a sample goes out every 50 ms by itself.
@@ -217,6 +219,7 @@ impl Scripted {
                 ended: 1,
             },
             refused: None,
+            lost: None,
             samples: VecDeque::new(),
             samples_flow: true,
             cut: false,
@@ -286,15 +289,19 @@ fn serve(mut stream: UnixStream, script: &Mutex<Script>) {
 fn replies(bytes: &[u8], decoder: &mut Decoder, script: &Mutex<Script>) -> Vec<FromBridge> {
     let reply = |message: &[u8]| {
         let request: Request<'_> = postcard::from_bytes(message).unwrap();
-        FromBridge::Reply(Reply {
+        let mut script = script.lock().unwrap();
+        let answer = script.answer(&request.call);
+        let name = format!("{:?}", request.call);
+        let lost = script.lost.take_if(|lost| name.starts_with(*lost));
+        lost.is_none().then_some(FromBridge::Reply(Reply {
             session: request.session,
             sequence: request.sequence,
-            answer: script.lock().unwrap().answer(&request.call),
-        })
+            answer,
+        }))
     };
     bytes
         .iter()
-        .filter_map(|byte| decoder.push(*byte, reply))
+        .filter_map(|byte| decoder.push(*byte, reply).flatten())
         .collect()
 }
 
