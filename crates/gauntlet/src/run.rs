@@ -213,6 +213,7 @@ impl Run {
             engages: options.engage,
             closed: self.clutch.ours(),
             expired: self.clutch.expired,
+            too_late: self.clutch.too_late,
         });
         driven
     }

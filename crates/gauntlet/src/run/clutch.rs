@@ -21,6 +21,10 @@ pub(super) struct Clutch {
     seen_closed: bool,
     /// It opened by itself, and nobody touched it since.
     pub expired: bool,
+    /// The order to close it was too old when it came, and nobody touched it since.
+    pub too_late: bool,
+    /// Orders that were too late before it was closed last.
+    late_before: u32,
     pub heartbeat: Option<Instant>,
 }
 
@@ -39,6 +43,7 @@ impl Run {
             closed: true,
             engaged: now,
             heartbeat: now,
+            late_before: self.session.orders().too_late(),
             ..Clutch::default()
         };
         self.order(Order::Engage);
@@ -46,7 +51,8 @@ impl Run {
 
     /// Opens the clutch, for a person.
     pub(super) fn release(&mut self) {
-        (self.clutch.closed, self.clutch.expired) = (false, false);
+        let clutch = &mut self.clutch;
+        (clutch.closed, clutch.expired, clutch.too_late) = (false, false, false);
         self.order(Order::Release);
     }
 
@@ -56,19 +62,24 @@ impl Run {
         let (true, Some(seen)) = (clutch.closed, self.session.snapshot()) else {
             return;
         };
+        if !clutch.seen_closed && self.session.orders().too_late() != clutch.late_before {
+            (clutch.closed, clutch.too_late) = (false, true);
+            return;
+        }
         match seen.clutch {
             Position::Closed | Position::Lost => clutch.seen_closed = true,
             Position::Open if clutch.seen_closed => clutch.closed = false,
             Position::Expired if clutch.seen_closed => {
                 (clutch.closed, clutch.expired) = (false, true);
             }
-            // The order to close it was too old when it came.
+            // It was closed and opened between two looks, or never: what is said of it since is what is so.
             Position::Open | Position::Expired => {
                 let settled = clutch
                     .engaged
                     .is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
                 if settled {
-                    (clutch.closed, clutch.expired) = (false, true);
+                    clutch.closed = false;
+                    clutch.expired = seen.clutch == Position::Expired;
                 }
             }
         }

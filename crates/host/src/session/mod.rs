@@ -42,7 +42,7 @@ mod worker;
 pub use calibrating::{kept, refused};
 pub use devices::Devices;
 pub use driven::Driven;
-pub use ending::{Driver, Ending};
+pub use ending::{CLOSED_TOO_LATE, Driver, Ending};
 pub use hub::{Happened, Hub};
 pub use in_process::{InProcess, Parts, check_image};
 pub use numbers::Progress;
