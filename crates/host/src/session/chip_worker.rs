@@ -67,6 +67,8 @@ pub(super) struct Worker {
     epoch: Option<Epoch>,
     /// The clutch was closed, or the gripper told to activate, by this session.
     touched: bool,
+    /// The gripper was told to activate by this session, and has not followed the hand since.
+    activation_asked: bool,
     clutch: Position,
     /// Heartbeats or, under an open clutch, questions for the status that no answer came to, in a row.
     missed: u32,
@@ -100,6 +102,7 @@ impl Worker {
             samples,
             epoch: None,
             touched: false,
+            activation_asked: false,
             clutch: Position::Open,
             missed: 0,
             devices: Told::new(&status),
@@ -149,6 +152,8 @@ impl Worker {
         Known {
             us: self.status.now_us.max(sampled),
             commands: self.counted.1.commands,
+            activation_asked: self.activation_asked,
+            activation: self.devices.gripper().map(|gripper| gripper.activation),
         }
     }
 
@@ -222,7 +227,7 @@ impl Worker {
                 (self.status, self.missed) = (self.link.release()?, 0);
             }
             Order::Activate => {
-                self.touched = true;
+                (self.touched, self.activation_asked) = (true, true);
                 self.link.activate()?;
             }
             Order::Calibrate(_) if self.epoch.is_some() => {
@@ -373,6 +378,8 @@ impl Worker {
         let newest = self.sample.as_ref();
         let sample = newest.filter(|sample| sample.now_us >= status.now_us);
         let state = sample.map_or(status.state, |sample| sample.state);
+        // An activation that has ended is over, whatever the gripper does later: none other is moved.
+        self.activation_asked &= !state.is_moving();
         let mut calibration = self.calibration;
         // The newest word: under a closed clutch nothing else is asked.
         calibration.is_calibrated &= state.hold_reason() != Some(HoldReason::NotCalibrated);

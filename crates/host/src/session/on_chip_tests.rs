@@ -229,3 +229,37 @@ fn a_clutch_is_closed_although_the_reply_to_a_question_before_was_lost() {
         assert_eq!(clutch, Some(Position::Closed), "{question}");
     }
 }
+
+#[test]
+fn an_activation_that_was_asked_for_goes_on_until_the_gripper_says_that_it_is_ready() {
+    use gripper::Activation::{Activating, Ready, Reset};
+    let left = |asked: bool, commands: u32, says: Option<gripper::Activation>| {
+        let bridge = Scripted::start();
+        {
+            let mut script = bridge.script();
+            (script.counters.commands, script.activation) = (commands, Reset);
+        }
+        let mut session = watching(&bridge);
+        if asked {
+            session.order(Order::Activate);
+            until(&session, |_| {
+                bridge.script().calls.contains(&"Activate".to_owned())
+            });
+        }
+        {
+            let mut script = bridge.script();
+            script.gripper = says.and(script.gripper);
+            script.activation = says.unwrap_or(Reset);
+        }
+        session.stop().unwrap()
+    };
+    for commands in [0, 1] {
+        for says in [None, Some(Reset), Some(Activating)] {
+            let left = left(true, commands, says);
+            assert_eq!(left, Stopped::Activating, "{commands} {says:?}");
+        }
+    }
+    assert_eq!(left(true, 0, Some(Ready)), Stopped::Untouched);
+    assert_eq!(left(true, 1, Some(Ready)), Stopped::Held);
+    assert_eq!(left(false, 0, Some(Reset)), Stopped::Untouched);
+}

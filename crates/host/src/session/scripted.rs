@@ -30,6 +30,8 @@ pub struct Script {
     pub engaged: State,
     /// Where the gripper says that it is; `None`: it does not answer.
     pub gripper: Option<[u8; 4]>,
+    /// What it says of its activation.
+    pub activation: Activation,
     /// What it repeats of what it is told.
     pub echo: [u8; 4],
     /// What it is told.
@@ -96,7 +98,7 @@ impl Script {
             heartbeat: self.epoch.is_some(),
             glove_answers: true,
             gripper: self.gripper.map(|position| GripperStatus {
-                activation: Activation::Ready,
+                activation: self.activation,
                 fault: Fault::None,
                 echo: axes(&self.echo),
                 position: axes(&position),
@@ -207,6 +209,7 @@ impl Scripted {
             closings: 0,
             engaged: State::Following,
             gripper: Some([10; 4]),
+            activation: Activation::Ready,
             echo: [10; 4],
             command: vec![10; 4],
             counters: Counters {
