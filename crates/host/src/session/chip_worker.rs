@@ -134,7 +134,12 @@ impl Worker {
             }
         };
         let known = self.known();
-        let stopped = match self.touched {
+        // Where another host has the bridge, the clutch of this session has opened by itself and the one that is closed is theirs.
+        let theirs = matches!(
+            fault,
+            Some(Error::Refused(protocol::message::Refusal::Busy { .. }))
+        );
+        let stopped = match self.touched && !theirs {
             true => stop(&mut self.link, known),
             // Somebody else may drive it.
             false => Stopped::Untouched,
@@ -187,8 +192,9 @@ impl Worker {
             quiet |= order == Order::Heartbeat;
         }
         let every = self.trying.map_or(STATUS_EVERY, |_| TRY_EVERY);
+        let mut answered = true;
         if self.epoch.is_none() && self.asked_status.elapsed() >= every {
-            self.ask_status(begun + HEARTBEAT)?;
+            answered = self.ask_status(Instant::now() + HEARTBEAT)?;
         }
         if quiet {
             self.count(begun + HEARTBEAT)?;
@@ -204,16 +210,21 @@ impl Worker {
             }
             self.sample = Some(sample);
         }
-        self.say();
+        // A clutch that is open now and a state from before do not go together.
+        if answered {
+            self.say();
+        }
         Ok(true)
     }
 
     fn obey(&mut self, order: Order) -> Result<(), Error> {
         match order {
             Order::Engage => {
+                self.epoch = None;
+                let answer = self.link.engage();
                 // Also where the answer is lost: the bridge may have closed it.
-                (self.touched, self.epoch) = (true, None);
-                let (epoch, status) = self.link.engage()?;
+                self.touched |= !matches!(answer, Err(Error::Refused(_)));
+                let (epoch, status) = answer?;
                 (self.epoch, self.status) = (Some(epoch), status);
                 (self.clutch, self.missed) = (Position::Closed, 0);
             }
@@ -273,18 +284,19 @@ impl Worker {
     }
 
     /// Asks under an open clutch where the answer comes by `end`: what was lost is asked for again in the next round, since an
-    /// order to close the clutch grows too old behind one that is waited for.
-    fn ask_status(&mut self, end: Instant) -> Result<(), Error> {
+    /// order to close the clutch grows too old behind one that is waited for. Returns whether it came.
+    fn ask_status(&mut self, end: Instant) -> Result<bool, Error> {
         let status = match self.missed {
             MISSED_STATUSES.. => Some(self.link.status()?),
             _ => self.link.status_by(end)?,
         };
         let Some(status) = status else {
             self.missed += 1;
-            return Ok(());
+            return Ok(false);
         };
         (self.status, self.missed, self.asked_status) = (status, 0, Instant::now());
-        self.look_at_calibration(end)
+        self.look_at_calibration(end)?;
+        Ok(true)
     }
 
     fn look_at_calibration(&mut self, end: Instant) -> Result<(), Error> {

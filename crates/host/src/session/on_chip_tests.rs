@@ -263,3 +263,22 @@ fn an_activation_that_was_asked_for_goes_on_until_the_gripper_says_that_it_is_re
     assert_eq!(left(true, 1, Some(Ready)), Stopped::Held);
     assert_eq!(left(false, 0, Some(Reset)), Stopped::Untouched);
 }
+
+#[test]
+fn the_clutch_of_another_host_that_has_the_bridge_is_not_opened() {
+    let bridge = Scripted::start();
+    let mut session = following(&bridge);
+    bridge.script().taken();
+    until_over(&session);
+    let told = session.stop().unwrap_err().to_string();
+    assert!(told.contains("another"), "{told}");
+    assert!(!bridge.script().calls.contains(&"Release".to_owned()));
+    // Nor where closing it was refused.
+    let bridge = Scripted::start();
+    let mut session = watching(&bridge);
+    bridge.script().refused = Some(("Engage", Refusal::Busy { session: 7 }));
+    session.order(Order::Engage);
+    until_over(&session);
+    assert!(session.stop().is_err());
+    assert!(!bridge.script().calls.contains(&"Release".to_owned()));
+}

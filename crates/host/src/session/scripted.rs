@@ -66,6 +66,12 @@ impl Script {
         self.calibration = CalibrationState::default();
     }
 
+    /// Another host says hello, and this session is over.
+    pub fn taken(&mut self) {
+        (self.session, self.epoch) = (false, None);
+        self.refused = Some(("Hello", Refusal::Busy { session: 7 }));
+    }
+
     /// Another host opens the clutch.
     pub fn open(&mut self) {
         self.epoch = None;
