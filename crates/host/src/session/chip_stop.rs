@@ -6,10 +6,11 @@ use bridge::State;
 use bridge::protocol::message::{Refusal, Status};
 use gripper::Activation;
 
-use super::on_chip::SAMPLE_MS;
 use super::stopped::{HOLD_WAIT, Standing, Stopped};
 use crate::chip::link::{Error, HostLink};
 
+/// Pause between two telemetry samples of a session, ms.
+pub const SAMPLE_MS: u16 = 50;
 /// Between two looks.
 const PAUSE: Duration = Duration::from_millis(30);
 /// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.

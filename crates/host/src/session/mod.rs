@@ -40,13 +40,14 @@ mod summary;
 mod worker;
 
 pub use calibrating::{kept, refused};
+pub use chip_stop::SAMPLE_MS;
 pub use devices::Devices;
 pub use driven::Driven;
 pub use ending::{CLOSED_TOO_LATE, Driver, Ending};
 pub use hub::{Happened, Hub};
 pub use in_process::{InProcess, Parts, check_image};
 pub use numbers::Progress;
-pub use on_chip::{OnChip, SAMPLE_MS};
+pub use on_chip::OnChip;
 pub use orders::{Order, Orders};
 pub use snapshot::Snapshot;
 pub use stopped::Stopped;
