@@ -73,7 +73,8 @@ pub(super) struct Worker {
     /// Heartbeats or, under an open clutch, questions for the status that no answer came to, in a row.
     missed: u32,
     status: Status,
-    asked_status: Instant,
+    /// When its answer came; `None` where it is asked for at once.
+    asked_status: Option<Instant>,
     sample: Option<Sample>,
     devices: Told,
     calibration: CalibrationState,
@@ -107,7 +108,7 @@ impl Worker {
             missed: 0,
             devices: Told::new(&status),
             status,
-            asked_status: now,
+            asked_status: Some(now),
             sample: None,
             calibration: CalibrationState::default(),
             calibration_known: false,
@@ -193,7 +194,8 @@ impl Worker {
         }
         let every = self.trying.map_or(STATUS_EVERY, |_| TRY_EVERY);
         let mut answered = true;
-        if self.epoch.is_none() && self.asked_status.elapsed() >= every {
+        let due = self.asked_status.is_none_or(|at| at.elapsed() >= every);
+        if self.epoch.is_none() && due {
             answered = self.ask_status(Instant::now() + HEARTBEAT)?;
         }
         if quiet {
@@ -265,7 +267,7 @@ impl Worker {
             }
             // Somebody else's release, or their closing, is an act: nothing went wrong.
             Heartbeat::Refused(why) => {
-                (self.epoch, self.missed) = (None, 0);
+                (self.epoch, self.missed, self.asked_status) = (None, 0, None);
                 self.clutch = match why {
                     HeartbeatRefusal::Expired => Position::Expired,
                     _ => Position::Open,
@@ -294,7 +296,7 @@ impl Worker {
             self.missed += 1;
             return Ok(false);
         };
-        (self.status, self.missed, self.asked_status) = (status, 0, Instant::now());
+        (self.status, self.missed, self.asked_status) = (status, 0, Some(Instant::now()));
         self.look_at_calibration(end)?;
         Ok(true)
     }
@@ -354,7 +356,6 @@ impl Worker {
 
     /// Four times a second, where the answer comes by `end`.
     fn look_at_devices(&mut self, end: Instant) -> Result<(), Error> {
-        let before = self.devices.stands();
         if self.devices.ask(&mut self.link, end)?.is_none() {
             return Ok(());
         }
@@ -362,7 +363,8 @@ impl Worker {
         if let Some(line) = self.devices.line() {
             said.totals.line(&line);
         }
-        if let Some(axis) = self.devices.stands().filter(|_| before.is_none()) {
+        // With every answer: a run that begins forgets what was told before.
+        if let Some(axis) = self.devices.stands() {
             said.numbers.obeyed.stands(axis);
         }
         Ok(())

@@ -282,3 +282,21 @@ fn the_clutch_of_another_host_that_has_the_bridge_is_not_opened() {
     assert!(session.stop().is_err());
     assert!(!bridge.script().calls.contains(&"Release".to_owned()));
 }
+
+#[test]
+fn an_axis_that_stood_before_the_run_began_and_stands_is_told() {
+    let bridge = Scripted::start();
+    bridge.script().stands = Some(1);
+    let session = following(&bridge);
+    let driver = Driver {
+        closed: true,
+        ..Driver::default()
+    };
+    let stood = |_: &Snapshot| {
+        let ending = session.hub().ending(driver).unwrap();
+        ending.disobeyed.is_some()
+    };
+    until(&session, stood);
+    session.hub().begin();
+    until(&session, stood);
+}

@@ -37,6 +37,8 @@ pub struct Script {
     /// What it is told.
     pub command: Vec<u8>,
     pub counters: Counters,
+    /// An axis that stands although it is told to move.
+    pub stands: Option<u8>,
     pub calibration: CalibrationState,
     /// Calls that are refused, by name.
     pub refused: Option<(&'static str, Refusal)>,
@@ -140,7 +142,7 @@ impl Script {
                 going_to: true,
                 axes: axes.iter().map(|_| axis).collect(),
             }),
-            stands: None,
+            stands: self.stands,
             replies: Replies::default(),
         }
     }
@@ -222,6 +224,7 @@ impl Scripted {
                 commands: 1,
                 ..Counters::default()
             },
+            stands: None,
             calibration: CalibrationState {
                 is_calibrated: true,
                 newest: Try::Taken,
