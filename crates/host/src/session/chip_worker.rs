@@ -15,11 +15,12 @@ use super::axes::Axes;
 use super::calibrating::told;
 use super::chip_devices::Told;
 use super::chip_stop::{Known, renew, stop};
-use super::hub::{Happened, Hub, Totals};
+use super::hub::{Happened, Hub};
 use super::orders::{Order, Queue};
 use super::record::Sort;
 use super::snapshot::Snapshot;
 use super::stopped::Stopped;
+use super::totals::Totals;
 use crate::chip::link::{Error, Heartbeat, HostLink};
 
 /// Pause between two looks at the orders, spent listening.
@@ -343,9 +344,9 @@ impl Worker {
         });
     }
 
-    /// Once a second, where the answer comes by `end`, when the next heartbeat is due.
+    /// Once a second, and when a run began, where the answer comes by `end`, when the next heartbeat is due.
     fn count(&mut self, end: Instant) -> Result<(), Error> {
-        if self.counted.0.elapsed() < COUNT_EVERY {
+        if self.counted.0.elapsed() < COUNT_EVERY && !self.hub.lock().totals.awaits() {
             return Ok(());
         }
         if let Some(counters) = self.link.counters_by(end)? {

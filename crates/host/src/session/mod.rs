@@ -37,6 +37,7 @@ pub mod slots;
 pub mod snapshot;
 pub mod stopped;
 mod summary;
+mod totals;
 mod worker;
 
 pub use calibrating::{kept, refused};
