@@ -77,11 +77,7 @@ impl FlatFirst {
                 lying.until = now.max(lying.since + RISE_S);
                 self.begins = Some(lying.until);
             }
-            Some(lying) if lying.until > now => {
-                if flat {
-                    lying.until = f64::INFINITY;
-                }
-            }
+            Some(lying) if flat && lying.until > now => lying.until = f64::INFINITY,
             _ if flat => {
                 let from = self.pose(now);
                 self.lying = Some(Lying {

@@ -37,7 +37,7 @@ impl Run {
         };
         let before = ended(self);
         let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
-        self.order(Order::Calibrate(wait));
+        self.order(Order::Calibrate(wait))?;
         tell.say(format_args!("{ASK}"));
         let end = Instant::now() + WAIT + ANSWER_WAIT;
         while Instant::now() < end {
@@ -82,11 +82,11 @@ impl Run {
             return Ok(true);
         }
         tell.say(format_args!("activating the gripper: its fingers move"));
-        self.activated = true;
         let orders = self.session.orders().clone();
         let before = orders.too_late();
         let late = || orders.too_late() != before;
-        self.order(Order::Activate);
+        self.order(Order::Activate)?;
+        self.activated = true;
         self.wait(ACTIVATION_WAIT, |seen| ready(seen) || late())?;
         if late() {
             self.activated = false;

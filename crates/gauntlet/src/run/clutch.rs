@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bridge::clutch::Position;
 
 use super::Run;
-use host::session::Order;
+use host::session::{Order, Orders};
 
 /// After this long the bridge has seen that the clutch was closed, on a line that loses most of what is said, too.
 const CLUTCH_SETTLES: Duration = Duration::from_secs(2);
@@ -25,6 +25,8 @@ pub(super) struct Clutch {
     pub too_late: bool,
     /// Orders that were too late before it was closed last.
     late_before: u32,
+    /// The order to open it was not taken yet.
+    release_due: bool,
     pub heartbeat: Option<Instant>,
 }
 
@@ -32,6 +34,13 @@ impl Clutch {
     /// Whether it was ever closed here.
     pub fn ours(&self) -> bool {
         self.engaged.is_some()
+    }
+
+    /// Gives the order to open it, until it is taken.
+    pub fn give_release(&mut self, orders: &Orders) {
+        if self.release_due {
+            self.release_due = !orders.give(Order::Release);
+        }
     }
 }
 
@@ -46,14 +55,18 @@ impl Run {
             late_before: self.session.orders().too_late(),
             ..Clutch::default()
         };
-        self.order(Order::Engage);
+        if !self.session.order(Order::Engage) {
+            // It would be too old once there is room.
+            (self.clutch.closed, self.clutch.too_late) = (false, true);
+        }
     }
 
     /// Opens the clutch, for a person.
     pub(super) fn release(&mut self) {
         let clutch = &mut self.clutch;
         (clutch.closed, clutch.expired, clutch.too_late) = (false, false, false);
-        self.order(Order::Release);
+        clutch.release_due = true;
+        clutch.give_release(self.session.orders());
     }
 
     /// Sees that the clutch opened by itself, or that somebody else opened it, which is an act.
@@ -83,5 +96,27 @@ impl Run {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use host::clock::Clock;
+
+    #[test]
+    fn an_order_to_open_the_clutch_that_was_not_taken_is_given_again() {
+        let (orders, queue) = Orders::queue(Clock::start());
+        while orders.give(Order::Heartbeat) {}
+        let mut clutch = Clutch {
+            release_due: true,
+            ..Clutch::default()
+        };
+        clutch.give_release(&orders);
+        while queue.next() == Some(Order::Heartbeat) {}
+        clutch.give_release(&orders);
+        clutch.give_release(&orders);
+        assert_eq!(queue.next(), Some(Order::Release));
+        assert_eq!(queue.next(), None, "once");
     }
 }
