@@ -13,6 +13,7 @@ use crate::realtime::Scheduling;
 
 /// What only a home's own counters tell.
 #[derive(Debug, Default)]
+#[expect(clippy::large_enum_variant, reason = "there is one in a session")]
 pub(super) enum Totals {
     /// Nothing yet.
     #[default]
