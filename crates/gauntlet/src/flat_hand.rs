@@ -1,6 +1,5 @@
 //! The virtual hand of `simulate` lies flat on request: a line on standard input.
 
-use std::io::Read;
 use std::os::fd::AsFd;
 
 use rig::glove::VirtualGlove;
@@ -15,8 +14,38 @@ const LINE: usize = 64;
 pub(crate) struct Hand {
     glove: VirtualGlove,
     flat: bool,
+    lines: Lines,
+}
+
+/// Lines that come on a descriptor, read as they come: what a buffer held back no poll would tell of.
+#[derive(Debug, Default)]
+struct Lines {
     line: Vec<u8>,
     ended: bool,
+}
+
+impl Lines {
+    /// The lines that have come whole; never waits. Reads some bytes at most.
+    fn read(&mut self, from: &impl AsFd) -> Vec<Vec<u8>> {
+        let mut bytes = [0; LINE];
+        let mut lines = Vec::new();
+        let count = match rustix::io::read(from, &mut bytes) {
+            Err(rustix::io::Errno::INTR | rustix::io::Errno::AGAIN) => return lines,
+            Ok(0) | Err(_) => {
+                self.ended = true;
+                return lines;
+            }
+            Ok(count) => count,
+        };
+        for byte in bytes.iter().take(count) {
+            if *byte == b'\n' {
+                lines.push(std::mem::take(&mut self.line));
+            } else if self.line.len() < LINE {
+                self.line.push(*byte);
+            }
+        }
+        lines
+    }
 }
 
 /// What a line asks for.
@@ -43,8 +72,7 @@ impl Hand {
         Self {
             glove: glove.clone(),
             flat: false,
-            line: Vec::new(),
-            ended: false,
+            lines: Lines::default(),
         }
     }
 
@@ -52,24 +80,11 @@ impl Hand {
     /// terminal in whose background it runs, which would stop this program.
     pub(crate) fn listen(&mut self) {
         let stdin = std::io::stdin();
-        if self.ended || in_background(&stdin) || !is_ready(&stdin) {
+        if self.lines.ended || in_background(&stdin) || !is_ready(&stdin) {
             return;
         }
-        let mut bytes = [0; LINE];
-        let count = match stdin.lock().read(&mut bytes) {
-            Ok(0) | Err(_) => {
-                self.ended = true;
-                return;
-            }
-            Ok(count) => count,
-        };
-        for byte in bytes.iter().take(count) {
-            if *byte == b'\n' {
-                let line = std::mem::take(&mut self.line);
-                self.obey(&line);
-            } else if self.line.len() < LINE {
-                self.line.push(*byte);
-            }
+        for line in self.lines.read(&stdin) {
+            self.obey(&line);
         }
     }
 
@@ -112,6 +127,23 @@ fn is_ready(descriptor: &impl AsFd) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::io::Write;
+
+    #[test]
+    fn of_lines_that_come_together_each_is_read_while_the_descriptor_says_that_there_are_more() {
+        let (mut there, here) = std::os::unix::net::UnixStream::pair().unwrap();
+        there.write_all(&b"move\n".repeat(30)).unwrap();
+        there.write_all(b"flat\nfl").unwrap();
+        let mut lines = Lines::default();
+        let mut heard = Vec::new();
+        while is_ready(&here) {
+            heard.extend(lines.read(&here));
+        }
+        assert_eq!(heard.len(), 31);
+        assert_eq!(heard.last().map(Vec::as_slice), Some(&b"flat"[..]));
+        drop(there);
+        assert!(lines.read(&here).is_empty() && lines.ended);
+    }
 
     #[test]
     fn a_line_says_what_the_hand_does_and_enter_alone_the_other() {

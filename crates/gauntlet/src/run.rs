@@ -18,7 +18,7 @@ use crate::live::{Key, Live};
 use crate::{note, out};
 use clutch::Clutch;
 use host::clock::Clock;
-use host::failure::OrFail;
+use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::recording::{QUEUE, SessionLog};
 use host::session::record::{self, Feed, Records, Sort};
@@ -197,8 +197,18 @@ impl Run {
     }
 
     /// Tells the bridge something.
-    pub fn order(&self, order: Order) {
-        self.session.order(order);
+    ///
+    /// # Errors
+    /// It was not taken: so many orders wait that the bridge's thread stands still.
+    pub fn order(&self, order: Order) -> Result<()> {
+        match self.session.order(order) {
+            true => Ok(()),
+            false => Err(Failure::new(
+                "the bridge takes no orders: those that were given wait",
+                "the same again, on a computer that neither sleeps nor has so much to do",
+            )
+            .into()),
+        }
     }
 
     /// Runs with heartbeat, keys and view until the time is over or somebody asks for the end.
@@ -213,6 +223,7 @@ impl Run {
             engages: options.engage,
             closed: self.clutch.ours(),
             expired: self.clutch.expired,
+            too_late: self.clutch.too_late,
         });
         driven
     }
@@ -328,7 +339,11 @@ impl Run {
                 }
             }
             Key::Open => self.release(),
-            Key::Calibrate => self.order(Order::Calibrate(glove::timing::STILL_WAIT)),
+            // One that is not taken says no word of having begun; who pressed it presses it again.
+            Key::Calibrate => {
+                self.session
+                    .order(Order::Calibrate(glove::timing::STILL_WAIT));
+            }
         }
     }
 
@@ -344,8 +359,10 @@ impl Run {
             .is_none_or(|last| now.duration_since(last) >= HEARTBEAT - ROUND / 2);
         if self.clutch.closed && due && !self.unseen {
             self.clutch.heartbeat = Some(now);
-            self.order(Order::Heartbeat);
+            // What is not taken is given again with the next.
+            self.session.order(Order::Heartbeat);
         }
+        self.clutch.give_release(self.session.orders());
         self.look_at_clutch();
         self.look_at_file_limit();
         self.look_at_events();

@@ -77,7 +77,7 @@ impl FlatFirst {
                 lying.until = now.max(lying.since + RISE_S);
                 self.begins = Some(lying.until);
             }
-            Some(lying) if lying.until > now => lying.until = f64::INFINITY,
+            Some(lying) if flat && lying.until > now => lying.until = f64::INFINITY,
             _ if flat => {
                 let from = self.pose(now);
                 self.lying = Some(Lying {
@@ -339,5 +339,23 @@ mod tests {
         hand.lie_flat(true);
         hand.pose_at(302.0);
         assert_eq!(hand.pose_at(303.1), row(0.0));
+    }
+
+    #[test]
+    fn a_hand_that_is_asked_twice_to_move_before_it_lies_moves() {
+        let mut hand = FlatFirst::new(Box::new(|_: f64| row(1.0)));
+        for (at, flat) in [(10.0, true), (10.2, false), (10.4, false)] {
+            hand.pose_at(at - 10.0);
+            hand.lie_flat(flat);
+            hand.pose_at(at);
+        }
+        assert_eq!(hand.pose_at(11.0), row(0.0));
+        assert_eq!(hand.pose_at(12.1), row(1.0));
+        // And one that is asked to lie flat after all stays.
+        for (at, flat) in [(20.0, true), (20.2, false), (20.4, true)] {
+            hand.lie_flat(flat);
+            hand.pose_at(at);
+        }
+        assert_eq!(hand.pose_at(300.0), row(0.0));
     }
 }

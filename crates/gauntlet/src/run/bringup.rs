@@ -37,7 +37,7 @@ impl Run {
         };
         let before = ended(self);
         let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
-        self.order(Order::Calibrate(wait));
+        self.order(Order::Calibrate(wait))?;
         tell.say(format_args!("{ASK}"));
         let end = Instant::now() + WAIT + ANSWER_WAIT;
         while Instant::now() < end {
@@ -82,9 +82,21 @@ impl Run {
             return Ok(true);
         }
         tell.say(format_args!("activating the gripper: its fingers move"));
+        let orders = self.session.orders().clone();
+        let before = orders.too_late();
+        let late = || orders.too_late() != before;
+        self.order(Order::Activate)?;
         self.activated = true;
-        self.order(Order::Activate);
-        let ready = self.wait(ACTIVATION_WAIT, ready)?;
+        self.wait(ACTIVATION_WAIT, |seen| ready(seen) || late())?;
+        if late() {
+            self.activated = false;
+            return Err(Failure::new(
+                "the gripper was not activated: the order came more than 250 ms late",
+                "the same again, on a computer that neither sleeps nor has so much to do",
+            )
+            .into());
+        }
+        let ready = self.snapshot().as_ref().is_some_and(ready);
         if ready || self.asked() {
             return Ok(ready);
         }

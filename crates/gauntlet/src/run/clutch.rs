@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use bridge::clutch::Position;
 
 use super::Run;
-use host::session::Order;
+use host::session::{Order, Orders};
 
 /// After this long the bridge has seen that the clutch was closed, on a line that loses most of what is said, too.
 const CLUTCH_SETTLES: Duration = Duration::from_secs(2);
@@ -21,6 +21,12 @@ pub(super) struct Clutch {
     seen_closed: bool,
     /// It opened by itself, and nobody touched it since.
     pub expired: bool,
+    /// The order to close it was too old when it came, and nobody touched it since.
+    pub too_late: bool,
+    /// Orders that were too late before it was closed last.
+    late_before: u32,
+    /// The order to open it was not taken yet.
+    release_due: bool,
     pub heartbeat: Option<Instant>,
 }
 
@@ -28,6 +34,13 @@ impl Clutch {
     /// Whether it was ever closed here.
     pub fn ours(&self) -> bool {
         self.engaged.is_some()
+    }
+
+    /// Gives the order to open it, until it is taken.
+    pub fn give_release(&mut self, orders: &Orders) {
+        if self.release_due {
+            self.release_due = !orders.give(Order::Release);
+        }
     }
 }
 
@@ -39,15 +52,21 @@ impl Run {
             closed: true,
             engaged: now,
             heartbeat: now,
+            late_before: self.session.orders().too_late(),
             ..Clutch::default()
         };
-        self.order(Order::Engage);
+        if !self.session.order(Order::Engage) {
+            // It would be too old once there is room.
+            (self.clutch.closed, self.clutch.too_late) = (false, true);
+        }
     }
 
     /// Opens the clutch, for a person.
     pub(super) fn release(&mut self) {
-        (self.clutch.closed, self.clutch.expired) = (false, false);
-        self.order(Order::Release);
+        let clutch = &mut self.clutch;
+        (clutch.closed, clutch.expired, clutch.too_late) = (false, false, false);
+        clutch.release_due = true;
+        clutch.give_release(self.session.orders());
     }
 
     /// Sees that the clutch opened by itself, or that somebody else opened it, which is an act.
@@ -56,21 +75,48 @@ impl Run {
         let (true, Some(seen)) = (clutch.closed, self.session.snapshot()) else {
             return;
         };
+        if !clutch.seen_closed && self.session.orders().too_late() != clutch.late_before {
+            (clutch.closed, clutch.too_late) = (false, true);
+            return;
+        }
         match seen.clutch {
             Position::Closed | Position::Lost => clutch.seen_closed = true,
             Position::Open if clutch.seen_closed => clutch.closed = false,
             Position::Expired if clutch.seen_closed => {
                 (clutch.closed, clutch.expired) = (false, true);
             }
-            // The order to close it was too old when it came.
+            // It was closed and opened between two looks, or never: what is said of it since is what is so.
             Position::Open | Position::Expired => {
                 let settled = clutch
                     .engaged
                     .is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
                 if settled {
-                    (clutch.closed, clutch.expired) = (false, true);
+                    clutch.closed = false;
+                    clutch.expired = seen.clutch == Position::Expired;
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use host::clock::Clock;
+
+    #[test]
+    fn an_order_to_open_the_clutch_that_was_not_taken_is_given_again() {
+        let (orders, queue) = Orders::queue(Clock::start());
+        while orders.give(Order::Heartbeat) {}
+        let mut clutch = Clutch {
+            release_due: true,
+            ..Clutch::default()
+        };
+        clutch.give_release(&orders);
+        while queue.next() == Some(Order::Heartbeat) {}
+        clutch.give_release(&orders);
+        clutch.give_release(&orders);
+        assert_eq!(queue.next(), Some(Order::Release));
+        assert_eq!(queue.next(), None, "once");
     }
 }

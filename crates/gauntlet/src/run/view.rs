@@ -8,7 +8,7 @@ use bridge::clutch::Position;
 use super::shown::{self, Hands};
 use super::{Options, Run};
 use crate::live::View;
-use host::session::Snapshot;
+use host::session::{CLOSED_TOO_LATE, Snapshot};
 
 impl Run {
     pub(super) fn view(&mut self, options: &Options, elapsed: Duration, keys: bool) -> View {
@@ -83,6 +83,9 @@ impl Run {
         faults.extend(self.log_end());
         if self.clutch.expired {
             faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
+        }
+        if self.clutch.too_late {
+            faults.push(CLOSED_TOO_LATE.to_owned());
         }
         if let Some(snapshot) = snapshot {
             let scheduling = self.session.scheduling();

@@ -14,7 +14,7 @@ use crate::chip::link::{Error, HostLink};
 const EVERY: Duration = Duration::from_millis(250);
 /// The same to a bridge that never answered this one: its firmware is from before it.
 const RARELY: Duration = Duration::from_secs(5);
-/// Questions without an answer after which it is taken for one.
+/// Questions without an answer after which it is taken for one, and what one that answered before said is not known any more.
 const MISSED: u32 = 4;
 /// What is no older than this goes on coming: its age stays what it was told to be, ms.
 const FRESH_MS: u32 = 200;
@@ -23,6 +23,8 @@ const FRESH_MS: u32 = 200;
 #[derive(Debug)]
 pub(super) struct Told {
     told: Option<Devices>,
+    /// It has answered before.
+    answers: bool,
     asked: Instant,
     missed: u32,
     /// The newest that the gripper said, with the bridge's time of it, µs; it stays when the gripper falls silent.
@@ -38,6 +40,7 @@ impl Told {
         let now = Instant::now();
         let mut known = Self {
             told: None,
+            answers: false,
             asked: now.checked_sub(EVERY).unwrap_or(now),
             missed: 0,
             gripper: None,
@@ -50,7 +53,7 @@ impl Told {
 
     /// Asks where it is time to, and the answer can come by `end`.
     pub fn ask(&mut self, link: &mut HostLink, end: Instant) -> Result<Option<&Devices>, Error> {
-        let every = if self.told.is_none() && self.missed >= MISSED {
+        let every = if !self.answers && self.missed >= MISSED {
             RARELY
         } else {
             EVERY
@@ -62,17 +65,21 @@ impl Told {
             return Ok(None);
         };
         self.asked = Instant::now();
-        match answer {
-            Some(devices) => {
-                self.hear(devices.now_us);
-                self.missed = 0;
-                Ok(Some(self.told.insert(devices)))
+        Ok(self.take(answer))
+    }
+
+    /// What came of a question.
+    fn take(&mut self, answer: Option<Devices>) -> Option<&Devices> {
+        let Some(devices) = answer else {
+            self.missed = self.missed.saturating_add(1);
+            if self.missed >= MISSED {
+                self.told = None;
             }
-            None => {
-                self.missed = self.missed.saturating_add(1);
-                Ok(None)
-            }
-        }
+            return None;
+        };
+        self.hear(devices.now_us);
+        (self.missed, self.answers) = (0, true);
+        Some(self.told.insert(devices))
     }
 
     /// The bridge was heard at its time `now_us`.
@@ -310,6 +317,21 @@ mod tests {
         assert_eq!(health[5], Health::Rejected(Fault::Frozen));
         let good = health.iter().filter(|health| health.is_good()).count();
         assert_eq!(good, 13);
+    }
+
+    #[test]
+    fn what_was_told_is_not_known_any_more_once_no_answer_comes() {
+        let mut known = known(8, true);
+        for _ in 1..MISSED {
+            assert!(known.take(None).is_none());
+        }
+        assert_eq!(known.stands(), Some(2), "one may be lost");
+        known.take(None);
+        assert!(known.sensors().is_none() && known.line().is_none());
+        assert_eq!((known.stands(), known.distrusted()), (None, 0));
+        assert!(!known.is_blocked(0));
+        assert!(known.take(Some(devices(9_900_000, 8))).is_some());
+        assert_eq!(known.stands(), Some(2));
     }
 
     #[test]

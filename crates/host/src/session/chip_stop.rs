@@ -3,13 +3,14 @@
 use std::time::{Duration, Instant};
 
 use bridge::State;
-use bridge::protocol::message::Refusal;
+use bridge::protocol::message::{Refusal, Status};
 use gripper::Activation;
 
-use super::on_chip::SAMPLE_MS;
 use super::stopped::{HOLD_WAIT, Standing, Stopped};
 use crate::chip::link::{Error, HostLink};
 
+/// Pause between two telemetry samples of a session, ms.
+pub const SAMPLE_MS: u16 = 50;
 /// Between two looks.
 const PAUSE: Duration = Duration::from_millis(30);
 /// Statuses of the gripper that must have come since: one may have been under way, the next rests on the hold.
@@ -23,6 +24,20 @@ pub(super) struct Known {
     pub us: u64,
     /// Commands that left.
     pub commands: u32,
+    /// This session told the gripper to activate, and it has not followed the hand since.
+    pub activation_asked: bool,
+    /// What the gripper said last of its activation.
+    pub activation: Option<Activation>,
+}
+
+impl Known {
+    /// Whether an activation may go on, as a bridge in this process judges it: it was asked for, and the gripper did not say
+    /// since that it is ready; or it says itself that one goes on, whoever asked for it.
+    fn is_activating(&self, status: &Status) -> bool {
+        let said = status.gripper.as_ref().map(|gripper| gripper.activation);
+        let ready = said.or(self.activation) == Some(Activation::Ready);
+        (self.activation_asked && !ready) || said == Some(Activation::Activating)
+    }
 }
 
 /// Opens the clutch and waits until the gripper has confirmed the hold, or the wait is over. Needs telemetry to be on.
@@ -65,9 +80,9 @@ fn confirmed(link: &mut HostLink, known: Known) -> Result<Stopped, Error> {
         if status.now_us < released_us {
             return Ok(Stopped::Restarted);
         }
-        return Ok(match status.gripper.map(|gripper| gripper.activation) {
-            Some(Activation::Activating) => Stopped::Activating,
-            _ => Stopped::Untouched,
+        return Ok(match known.is_activating(&status) {
+            true => Stopped::Activating,
+            false => Stopped::Untouched,
         });
     }
     let end = Instant::now() + Duration::from_micros(HOLD_WAIT.as_micros());
@@ -82,6 +97,9 @@ fn confirmed(link: &mut HostLink, known: Known) -> Result<Stopped, Error> {
         let status = ask(link, HostLink::status)?;
         if status.now_us < released_us {
             return Ok(Stopped::Restarted);
+        }
+        if known.activation_asked && known.is_activating(&status) {
+            return Ok(Stopped::Activating);
         }
         let counters = link.counters()?;
         let answered = counters.statuses.wrapping_sub(at_release.statuses) >= STATUSES;

@@ -15,11 +15,12 @@ use super::axes::Axes;
 use super::calibrating::told;
 use super::chip_devices::Told;
 use super::chip_stop::{Known, renew, stop};
-use super::hub::{Happened, Hub, Totals};
+use super::hub::{Happened, Hub};
 use super::orders::{Order, Queue};
 use super::record::Sort;
 use super::snapshot::Snapshot;
 use super::stopped::Stopped;
+use super::totals::Totals;
 use crate::chip::link::{Error, Heartbeat, HostLink};
 
 /// Pause between two looks at the orders, spent listening.
@@ -32,6 +33,8 @@ const STATUS_EVERY: Duration = Duration::from_millis(500);
 const TRY_EVERY: Duration = Duration::from_millis(100);
 /// Pause between two looks at the counters.
 const COUNT_EVERY: Duration = Duration::from_secs(1);
+/// Questions for the status without an answer, in a row, after which one is asked as often as it takes.
+const MISSED_STATUSES: u32 = 3;
 /// Heartbeats without an answer, in a row, after which nobody is there: 2 s.
 const MISSED_BEATS: u32 = 20;
 /// Frames between two looks at the counters that say something of the glove.
@@ -65,10 +68,14 @@ pub(super) struct Worker {
     epoch: Option<Epoch>,
     /// The clutch was closed, or the gripper told to activate, by this session.
     touched: bool,
+    /// The gripper was told to activate by this session, and has not followed the hand since.
+    activation_asked: bool,
     clutch: Position,
+    /// Heartbeats or, under an open clutch, questions for the status that no answer came to, in a row.
     missed: u32,
     status: Status,
-    asked_status: Instant,
+    /// When its answer came; `None` where it is asked for at once.
+    asked_status: Option<Instant>,
     sample: Option<Sample>,
     devices: Told,
     calibration: CalibrationState,
@@ -97,11 +104,12 @@ impl Worker {
             samples,
             epoch: None,
             touched: false,
+            activation_asked: false,
             clutch: Position::Open,
             missed: 0,
             devices: Told::new(&status),
             status,
-            asked_status: now,
+            asked_status: Some(now),
             sample: None,
             calibration: CalibrationState::default(),
             calibration_known: false,
@@ -128,7 +136,12 @@ impl Worker {
             }
         };
         let known = self.known();
-        let stopped = match self.touched {
+        // Where another host has the bridge, the clutch of this session has opened by itself and the one that is closed is theirs.
+        let theirs = matches!(
+            fault,
+            Some(Error::Refused(protocol::message::Refusal::Busy { .. }))
+        );
+        let stopped = match self.touched && !theirs {
             true => stop(&mut self.link, known),
             // Somebody else may drive it.
             false => Stopped::Untouched,
@@ -146,6 +159,8 @@ impl Worker {
         Known {
             us: self.status.now_us.max(sampled),
             commands: self.counted.1.commands,
+            activation_asked: self.activation_asked,
+            activation: self.devices.gripper().map(|gripper| gripper.activation),
         }
     }
 
@@ -179,10 +194,10 @@ impl Worker {
             quiet |= order == Order::Heartbeat;
         }
         let every = self.trying.map_or(STATUS_EVERY, |_| TRY_EVERY);
-        if self.epoch.is_none() && self.asked_status.elapsed() >= every {
-            self.asked_status = Instant::now();
-            self.status = self.link.status()?;
-            self.look_at_calibration()?;
+        let mut answered = true;
+        let due = self.asked_status.is_none_or(|at| at.elapsed() >= every);
+        if self.epoch.is_none() && due {
+            answered = self.ask_status(Instant::now() + HEARTBEAT)?;
         }
         if quiet {
             self.count(begun + HEARTBEAT)?;
@@ -198,16 +213,21 @@ impl Worker {
             }
             self.sample = Some(sample);
         }
-        self.say();
+        // A clutch that is open now and a state from before do not go together.
+        if answered {
+            self.say();
+        }
         Ok(true)
     }
 
     fn obey(&mut self, order: Order) -> Result<(), Error> {
         match order {
             Order::Engage => {
+                self.epoch = None;
+                let answer = self.link.engage();
                 // Also where the answer is lost: the bridge may have closed it.
-                (self.touched, self.epoch) = (true, None);
-                let (epoch, status) = self.link.engage()?;
+                self.touched |= !matches!(answer, Err(Error::Refused(_)));
+                let (epoch, status) = answer?;
                 (self.epoch, self.status) = (Some(epoch), status);
                 (self.clutch, self.missed) = (Position::Closed, 0);
             }
@@ -218,10 +238,10 @@ impl Worker {
             }
             Order::Release => {
                 (self.epoch, self.clutch) = (None, Position::Open);
-                self.status = self.link.release()?;
+                (self.status, self.missed) = (self.link.release()?, 0);
             }
             Order::Activate => {
-                self.touched = true;
+                (self.touched, self.activation_asked) = (true, true);
                 self.link.activate()?;
             }
             Order::Calibrate(_) if self.epoch.is_some() => {
@@ -248,7 +268,7 @@ impl Worker {
             }
             // Somebody else's release, or their closing, is an act: nothing went wrong.
             Heartbeat::Refused(why) => {
-                self.epoch = None;
+                (self.epoch, self.missed, self.asked_status) = (None, 0, None);
                 self.clutch = match why {
                     HeartbeatRefusal::Expired => Position::Expired,
                     _ => Position::Open,
@@ -266,11 +286,30 @@ impl Worker {
         Ok(())
     }
 
-    fn look_at_calibration(&mut self) -> Result<(), Error> {
-        let now = match self.link.health() {
+    /// Asks under an open clutch where the answer comes by `end`: what was lost is asked for again in the next round, since an
+    /// order to close the clutch grows too old behind one that is waited for. Returns whether it came.
+    fn ask_status(&mut self, end: Instant) -> Result<bool, Error> {
+        let status = match self.missed {
+            MISSED_STATUSES.. => Some(self.link.status()?),
+            _ => self.link.status_by(end)?,
+        };
+        let Some(status) = status else {
+            self.missed += 1;
+            return Ok(false);
+        };
+        (self.status, self.missed, self.asked_status) = (status, 0, Some(Instant::now()));
+        self.look_at_calibration(end)?;
+        Ok(true)
+    }
+
+    fn look_at_calibration(&mut self, end: Instant) -> Result<(), Error> {
+        let now = match self.link.health_by(end) {
             // That of an older bridge, which only watches and is flashed, is not known.
             Err(Error::Older { .. }) => return Ok(()),
-            health => health?.calibration,
+            health => match health? {
+                Some(health) => health.calibration,
+                None => return Ok(()),
+            },
         };
         self.calibration_known = true;
         let Some(trying) = &mut self.trying else {
@@ -305,9 +344,9 @@ impl Worker {
         });
     }
 
-    /// Once a second, where the answer comes by `end`, when the next heartbeat is due.
+    /// Once a second, and when a run began, where the answer comes by `end`, when the next heartbeat is due.
     fn count(&mut self, end: Instant) -> Result<(), Error> {
-        if self.counted.0.elapsed() < COUNT_EVERY {
+        if self.counted.0.elapsed() < COUNT_EVERY && !self.hub.lock().totals.awaits() {
             return Ok(());
         }
         if let Some(counters) = self.link.counters_by(end)? {
@@ -318,7 +357,6 @@ impl Worker {
 
     /// Four times a second, where the answer comes by `end`.
     fn look_at_devices(&mut self, end: Instant) -> Result<(), Error> {
-        let before = self.devices.stands();
         if self.devices.ask(&mut self.link, end)?.is_none() {
             return Ok(());
         }
@@ -326,7 +364,8 @@ impl Worker {
         if let Some(line) = self.devices.line() {
             said.totals.line(&line);
         }
-        if let Some(axis) = self.devices.stands().filter(|_| before.is_none()) {
+        // With every answer: a run that begins forgets what was told before.
+        if let Some(axis) = self.devices.stands() {
             said.numbers.obeyed.stands(axis);
         }
         Ok(())
@@ -354,6 +393,8 @@ impl Worker {
         let newest = self.sample.as_ref();
         let sample = newest.filter(|sample| sample.now_us >= status.now_us);
         let state = sample.map_or(status.state, |sample| sample.state);
+        // An activation that has ended is over, whatever the gripper does later: none other is moved.
+        self.activation_asked &= !state.is_moving();
         let mut calibration = self.calibration;
         // The newest word: under a closed clutch nothing else is asked.
         calibration.is_calibrated &= state.hold_reason() != Some(HoldReason::NotCalibrated);

@@ -10,6 +10,9 @@ use crate::next::{Command, NextStep};
 use crate::realtime;
 use crate::stats::seconds;
 
+/// What a person is told whose order to close the clutch was too old when it came.
+pub const CLOSED_TOO_LATE: &str = "the clutch was not closed: the order came more than 250 ms late";
+
 /// What whoever drove knows of the run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct Driver {
@@ -21,6 +24,8 @@ pub struct Driver {
     pub closed: bool,
     /// The clutch opened by itself, and nobody closed it again.
     pub expired: bool,
+    /// The order to close the clutch was too old when it came, and nobody gave it again.
+    pub too_late: bool,
 }
 
 /// How everything was when the run ended, before the clutch was opened.
@@ -77,6 +82,12 @@ impl Ending {
         }
         if self.driver.expired && !self.driver.attended {
             return Some(clutch_expired());
+        }
+        if self.driver.too_late && !self.driver.attended {
+            return Some(Failure::new(
+                format!("{CLOSED_TOO_LATE}, and the gripper followed nobody"),
+                "the same on a computer that neither sleeps nor has so much to do; on a terminal, space closes the clutch",
+            ));
         }
         if !self.gripper_answers {
             return Some(Failure::new(

@@ -181,3 +181,21 @@ fn what_grew_old_in_a_busy_computer_is_not_blamed_on_the_devices() {
         names(ending, reason, BUSY);
     }
 }
+
+#[test]
+fn an_order_to_close_the_clutch_that_came_too_late_is_told_as_that_and_not_as_a_clutch_that_opened()
+{
+    let late = |attended| Ending {
+        driver: Driver {
+            attended,
+            too_late: true,
+            ..well().driver
+        },
+        ..well()
+    };
+    let (here, _) = told(late(false)).unwrap();
+    assert!(here.contains("was not closed"), "{here}");
+    assert!(!here.contains("opened by itself"), "{here}");
+    // Who is at the keys sees it, and closes it again or does not.
+    assert_eq!(told(late(true)), None);
+}

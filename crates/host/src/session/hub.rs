@@ -6,23 +6,19 @@
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use bridge::event::Kind;
-use bridge::protocol::message;
-use bridge::telemetry::Counters;
 use bridge::{HoldReason, State};
-use gripper::link;
 
 use super::driven::{Driven, Moment};
 use super::ending::{Driver, Ending};
 use super::lasting::Lasting;
 use super::numbers::{Numbers, Progress};
 use super::record::Sort;
-use super::replies::Failed;
 use super::snapshot::Snapshot;
 use super::summary::Summary;
-use crate::realtime::Scheduling;
+use super::totals::Totals;
 
 /// Events kept for watchers.
 pub const EVENTS: usize = 32;
@@ -41,62 +37,6 @@ pub struct Happened {
 /// What a session says. Clones watch the same one.
 #[derive(Debug, Clone, Default)]
 pub struct Hub(Arc<Mutex<Said>>);
-
-/// What only a home's own counters tell.
-#[derive(Debug, Default)]
-pub(super) enum Totals {
-    /// Nothing yet.
-    #[default]
-    None,
-    /// Of a bridge in this process.
-    InProcess(Counters, Scheduling),
-    /// Of a bridge on a chip: what it had counted when the run began, and now; and when it said so.
-    OnChip {
-        before: (message::Counters, Instant),
-        newest: (message::Counters, Instant),
-        /// The gripper's line at the same two times, where the chip tells.
-        line: Option<[link::Counters; 2]>,
-    },
-}
-
-impl Totals {
-    /// Of a bridge on a chip, from here on.
-    pub fn on_chip(counters: &message::Counters, at: Instant) -> Self {
-        let before = (*counters, at);
-        Self::OnChip {
-            before,
-            newest: before,
-            line: None,
-        }
-    }
-
-    /// A bridge on a chip said what it has counted.
-    pub fn count(&mut self, counters: &message::Counters, at: Instant) {
-        if let Self::OnChip { newest, .. } = self {
-            *newest = (*counters, at);
-        }
-    }
-
-    /// The same of its gripper's line.
-    pub fn line(&mut self, counters: &link::Counters) {
-        if let Self::OnChip { line, .. } = self {
-            let [before, _] = line.unwrap_or([*counters; 2]);
-            *line = Some([before, *counters]);
-        }
-    }
-
-    fn begin(&mut self) {
-        if let Self::OnChip {
-            before,
-            newest,
-            line,
-        } = self
-        {
-            *before = *newest;
-            *line = line.map(|[_, now]| [now; 2]);
-        }
-    }
-}
 
 /// What was said so far.
 #[derive(Debug, Default)]
@@ -131,22 +71,7 @@ impl Said {
 
     /// The sum of the run, at `now`.
     fn summary(&self, now: gripper::Instant) -> Summary {
-        let summary = self.numbers.summary(now);
-        match &self.totals {
-            Totals::None => summary,
-            Totals::InProcess(counters, scheduling) => summary.with(counters, *scheduling),
-            Totals::OnChip {
-                before,
-                newest,
-                line,
-            } => {
-                let time = newest.1.saturating_duration_since(before.1);
-                Summary {
-                    gripper_failed: line.map(|[before, now]| Failed::between(&before, &now)),
-                    ..summary.on_chip(&newest.0.since(&before.0), time)
-                }
-            }
-        }
+        self.totals.sum(self.numbers.summary(now))
     }
 
     /// Something happened.
@@ -170,15 +95,22 @@ impl Hub {
         self.lock().newest
     }
 
-    /// How the run goes.
+    /// How the run goes. The bridge's thread does not wait while the latencies are looked through.
     pub fn progress(&self) -> Progress {
         let mut said = self.lock();
         let Some(now) = said.newest.map(|newest| newest.now) else {
             return Progress::default();
         };
-        Progress {
-            gripper_faults: said.summary(now).gripper_faults,
+        let progress = Progress {
+            gripper_faults: said.totals.faults(),
             ..said.numbers.progress(now)
+        };
+        let latency = said.numbers.latency.clone();
+        drop(said);
+        Progress {
+            latency_p50: latency.at(0.5),
+            latency_p99: latency.at(0.99),
+            ..progress
         }
     }
 
@@ -249,9 +181,16 @@ impl Hub {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::realtime::Scheduling;
     use crate::session::Devices;
     use bridge::calibration::Try;
     use bridge::clutch::Position;
+    use bridge::protocol::message;
+    use bridge::telemetry::Counters;
+    use std::time::Instant;
+
+    /// Longer after a run's beginning than what was counted before it.
+    const AFTER: Duration = Duration::from_secs(1);
 
     /// A run of 12 s that ends while it follows. Of each 400 ms it was held for 250 ms, until enough frames had come in a row.
     fn held_in_pieces(totals: Totals) -> anyhow::Result<()> {
@@ -277,7 +216,7 @@ mod tests {
     fn a_run_that_was_held_for_most_of_its_time_in_pieces_has_failed_in_both_homes() {
         let counters = message::Counters::default();
         for totals in [
-            Totals::InProcess(Counters::default(), Scheduling::Shared),
+            Totals::in_process(&Counters::default()),
             Totals::on_chip(&counters, Instant::now()),
         ] {
             let told = held_in_pieces(totals).unwrap_err().to_string();
@@ -296,17 +235,26 @@ mod tests {
             faults: 5,
             ..Default::default()
         };
-        let mut chip = Totals::on_chip(&before, Instant::now());
-        chip.count(&grown, Instant::now());
-        let here = Counters {
-            faults: 2,
+        let here = |faults| Counters {
+            faults,
             ..Default::default()
         };
-        for totals in [Totals::InProcess(here, Scheduling::Shared), chip] {
+        for totals in [
+            Totals::in_process(&here(5)),
+            Totals::on_chip(&before, Instant::now()),
+        ] {
             let hub = Hub::default();
             hub.lock().totals = totals;
             hub.lock()
                 .say(Snapshot::at(1, Position::Open, State::Idle), false);
+            hub.begin();
+            let mut said = hub.lock();
+            let now = gripper::Instant::from_ticks(10_000);
+            match said.totals {
+                Totals::OnChip { .. } => said.totals.count(&grown, Instant::now() + AFTER),
+                _ => said.totals.here(&here(7), now, Scheduling::Shared),
+            }
+            drop(said);
             let shown = hub.progress().gripper_faults;
             assert_eq!((shown, hub.summary().gripper_faults), (2, 2));
         }

@@ -78,9 +78,12 @@ impl Obeyed {
         }
     }
 
-    /// The bridge says that this axis stands although it is told to move.
+    /// The bridge says that this axis stands although it is told to move; it may say so again and again.
     pub fn stands(&mut self, axis: u8) {
-        self.stood = Some((axis.into(), None));
+        let axis = usize::from(axis);
+        if self.stood.is_none_or(|(known, _)| known != axis) {
+            self.stood = Some((axis, None));
+        }
     }
 
     /// Whether the axis that stood has moved since.

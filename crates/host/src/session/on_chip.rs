@@ -11,6 +11,7 @@ use anyhow::Result;
 use bridge::protocol::message::Sample;
 
 use super::Session;
+use super::chip_stop::SAMPLE_MS;
 use super::chip_worker::{Left, Worker};
 use super::hub::Hub;
 use super::orders::{Order, Orders};
@@ -20,9 +21,6 @@ use crate::clock::Clock;
 use crate::failure::OrFail;
 use crate::lines::port::Watch;
 use crate::realtime::Scheduling;
-
-/// Pause between two telemetry samples, ms.
-pub const SAMPLE_MS: u16 = 50;
 
 /// A bridge on a chip.
 #[derive(Debug)]

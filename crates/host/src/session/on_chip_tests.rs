@@ -208,3 +208,97 @@ fn a_bridge_that_was_held_all_the_time_makes_a_run_that_has_failed() {
     let told = ending.judge(&Devices::Unknown).unwrap_err().to_string();
     assert!(told.contains("never followed"), "{told}");
 }
+
+/// Until the reply to the next such question is lost.
+fn lose(bridge: &Scripted, question: &'static str) {
+    bridge.script().lost = Some(question);
+    let end = Instant::now() + SOON;
+    while bridge.script().lost.is_some() {
+        assert!(Instant::now() < end, "nobody asks for {question}");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+}
+
+#[test]
+fn a_clutch_is_closed_although_the_reply_to_a_question_before_was_lost() {
+    for question in ["Status", "Health"] {
+        let bridge = Scripted::start();
+        let session = watching(&bridge);
+        lose(&bridge, question);
+        assert!(session.order(Order::Engage));
+        std::thread::sleep(Duration::from_millis(600));
+        let clutch = session.snapshot().map(|seen| seen.clutch);
+        assert_eq!(clutch, Some(Position::Closed), "{question}");
+    }
+}
+
+#[test]
+fn an_activation_that_was_asked_for_goes_on_until_the_gripper_says_that_it_is_ready() {
+    use gripper::Activation::{Activating, Ready, Reset};
+    let left = |asked: bool, commands: u32, says: Option<gripper::Activation>| {
+        let bridge = Scripted::start();
+        {
+            let mut script = bridge.script();
+            (script.counters.commands, script.activation) = (commands, Reset);
+        }
+        let mut session = watching(&bridge);
+        if asked {
+            session.order(Order::Activate);
+            until(&session, |_| {
+                bridge.script().calls.contains(&"Activate".to_owned())
+            });
+        }
+        {
+            let mut script = bridge.script();
+            script.gripper = says.and(script.gripper);
+            script.activation = says.unwrap_or(Reset);
+        }
+        session.stop().unwrap()
+    };
+    for commands in [0, 1] {
+        for says in [None, Some(Reset), Some(Activating)] {
+            let left = left(true, commands, says);
+            assert_eq!(left, Stopped::Activating, "{commands} {says:?}");
+        }
+    }
+    assert_eq!(left(true, 0, Some(Ready)), Stopped::Untouched);
+    assert_eq!(left(true, 1, Some(Ready)), Stopped::Held);
+    assert_eq!(left(false, 0, Some(Reset)), Stopped::Untouched);
+}
+
+#[test]
+fn the_clutch_of_another_host_that_has_the_bridge_is_not_opened() {
+    let bridge = Scripted::start();
+    let mut session = following(&bridge);
+    bridge.script().taken();
+    until_over(&session);
+    let told = session.stop().unwrap_err().to_string();
+    assert!(told.contains("another"), "{told}");
+    assert!(!bridge.script().calls.contains(&"Release".to_owned()));
+    // Nor where closing it was refused.
+    let bridge = Scripted::start();
+    let mut session = watching(&bridge);
+    bridge.script().refused = Some(("Engage", Refusal::Busy { session: 7 }));
+    session.order(Order::Engage);
+    until_over(&session);
+    assert!(session.stop().is_err());
+    assert!(!bridge.script().calls.contains(&"Release".to_owned()));
+}
+
+#[test]
+fn an_axis_that_stood_before_the_run_began_and_stands_is_told() {
+    let bridge = Scripted::start();
+    bridge.script().stands = Some(1);
+    let session = following(&bridge);
+    let driver = Driver {
+        closed: true,
+        ..Driver::default()
+    };
+    let stood = |_: &Snapshot| {
+        let ending = session.hub().ending(driver).unwrap();
+        ending.disobeyed.is_some()
+    };
+    until(&session, stood);
+    session.hub().begin();
+    until(&session, stood);
+}

@@ -1,7 +1,7 @@
 //! What a bridge can be told, by as many as like to: one bounded queue, in which orders meet.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use bridge::timing::{HEARTBEAT_TIMEOUT, is_within};
@@ -32,6 +32,11 @@ pub enum Order {
 }
 
 impl Order {
+    /// Whether a person closes the clutch or activates the gripper by it.
+    fn is_act(self) -> bool {
+        matches!(self, Self::Engage | Self::Activate)
+    }
+
     /// Whether it makes motion possible: then it counts only while it is young.
     fn moves(self) -> bool {
         matches!(self, Self::Engage | Self::Heartbeat | Self::Activate)
@@ -50,6 +55,7 @@ struct Given {
 pub struct Orders {
     queue: SyncSender<Given>,
     stop: Arc<AtomicBool>,
+    too_late: Arc<AtomicU32>,
     clock: Clock,
 }
 
@@ -58,12 +64,20 @@ impl Orders {
     pub fn queue(clock: Clock) -> (Self, Queue) {
         let (queue, given) = sync_channel(ORDERS);
         let stop = Arc::new(AtomicBool::new(false));
+        let too_late = Arc::new(AtomicU32::new(0));
         let taken = Queue {
             given,
             stop: Arc::clone(&stop),
+            too_late: Arc::clone(&too_late),
             clock,
         };
-        (Self { queue, stop, clock }, taken)
+        let orders = Self {
+            queue,
+            stop,
+            too_late,
+            clock,
+        };
+        (orders, taken)
     }
 
     /// Tells the bridge something; never waits. Returns whether it was taken: not when the queue is full or the bridge has
@@ -76,6 +90,11 @@ impl Orders {
         let at = self.clock.now();
         self.queue.try_send(Given { order, at }).is_ok()
     }
+
+    /// Orders to close the clutch or to activate that were passed over so far, since they were too old when they came.
+    pub fn too_late(&self) -> u32 {
+        self.too_late.load(Ordering::Relaxed)
+    }
 }
 
 /// The bridge's end.
@@ -83,6 +102,7 @@ impl Orders {
 pub struct Queue {
     given: Receiver<Given>,
     stop: Arc<AtomicBool>,
+    too_late: Arc<AtomicU32>,
     clock: Clock,
 }
 
@@ -95,6 +115,9 @@ impl Queue {
             let old = !is_within(self.clock.now(), at, HEARTBEAT_TIMEOUT);
             if !(order.moves() && (old || ends)) {
                 return Some(order);
+            }
+            if old && order.is_act() {
+                self.too_late.fetch_add(1, Ordering::Relaxed);
             }
         }
         ends.then_some(Order::Stop)
@@ -114,6 +137,7 @@ mod tests {
         ));
         assert!(orders.give(Order::Release));
         assert_eq!(queue.next(), Some(Order::Release), "the engagement is old");
+        assert_eq!(orders.too_late(), 1, "and its giver can see so");
         assert_eq!(queue.next(), None);
         orders.give(Order::Activate);
         orders.clone().give(Order::Stop);

@@ -30,14 +30,20 @@ pub struct Script {
     pub engaged: State,
     /// Where the gripper says that it is; `None`: it does not answer.
     pub gripper: Option<[u8; 4]>,
+    /// What it says of its activation.
+    pub activation: Activation,
     /// What it repeats of what it is told.
     pub echo: [u8; 4],
     /// What it is told.
     pub command: Vec<u8>,
     pub counters: Counters,
+    /// An axis that stands although it is told to move.
+    pub stands: Option<u8>,
     pub calibration: CalibrationState,
     /// Calls that are refused, by name.
     pub refused: Option<(&'static str, Refusal)>,
+    /// Call whose next reply is lost on the way, by name.
+    pub lost: Option<&'static str>,
     /// Samples to be sent.
     pub samples: VecDeque<Sample>,
     /// Whether a sample goes out every 50 ms by itself.
@@ -60,6 +66,12 @@ impl Script {
         (self.session, self.epoch) = (false, None);
         self.counters = Counters::default();
         self.calibration = CalibrationState::default();
+    }
+
+    /// Another host says hello, and this session is over.
+    pub fn taken(&mut self) {
+        (self.session, self.epoch) = (false, None);
+        self.refused = Some(("Hello", Refusal::Busy { session: 7 }));
     }
 
     /// Another host opens the clutch.
@@ -94,7 +106,7 @@ impl Script {
             heartbeat: self.epoch.is_some(),
             glove_answers: true,
             gripper: self.gripper.map(|position| GripperStatus {
-                activation: Activation::Ready,
+                activation: self.activation,
                 fault: Fault::None,
                 echo: axes(&self.echo),
                 position: axes(&position),
@@ -130,7 +142,7 @@ impl Script {
                 going_to: true,
                 axes: axes.iter().map(|_| axis).collect(),
             }),
-            stands: None,
+            stands: self.stands,
             replies: Replies::default(),
         }
     }
@@ -205,18 +217,21 @@ impl Scripted {
             closings: 0,
             engaged: State::Following,
             gripper: Some([10; 4]),
+            activation: Activation::Ready,
             echo: [10; 4],
             command: vec![10; 4],
             counters: Counters {
                 commands: 1,
                 ..Counters::default()
             },
+            stands: None,
             calibration: CalibrationState {
                 is_calibrated: true,
                 newest: Try::Taken,
                 ended: 1,
             },
             refused: None,
+            lost: None,
             samples: VecDeque::new(),
             samples_flow: true,
             cut: false,
@@ -286,15 +301,19 @@ fn serve(mut stream: UnixStream, script: &Mutex<Script>) {
 fn replies(bytes: &[u8], decoder: &mut Decoder, script: &Mutex<Script>) -> Vec<FromBridge> {
     let reply = |message: &[u8]| {
         let request: Request<'_> = postcard::from_bytes(message).unwrap();
-        FromBridge::Reply(Reply {
+        let mut script = script.lock().unwrap();
+        let answer = script.answer(&request.call);
+        let name = format!("{:?}", request.call);
+        let lost = script.lost.take_if(|lost| name.starts_with(*lost));
+        lost.is_none().then_some(FromBridge::Reply(Reply {
             session: request.session,
             sequence: request.sequence,
-            answer: script.lock().unwrap().answer(&request.call),
-        })
+            answer,
+        }))
     };
     bytes
         .iter()
-        .filter_map(|byte| decoder.push(*byte, reply))
+        .filter_map(|byte| decoder.push(*byte, reply).flatten())
         .collect()
 }
 

@@ -212,10 +212,11 @@ impl Summary {
     }
 
     /// Whether the bridge's own steps came so late that samples and replies grew old in this computer. A program that somebody
-    /// stopped, or a computer that slept, stood still and is not busy.
+    /// stopped, or a computer that slept, stood still and is not busy; and the latest step of a chip, which tells no stalls, may
+    /// have been any since it started.
     pub fn too_busy(&self) -> bool {
         u64::from(self.late_steps) * LATE_ONE_IN > u64::from(self.steps)
-            || (self.worst_late_us >= VERY_LATE_US && self.stalls.unwrap_or(0) == 0)
+            || (self.worst_late_us >= VERY_LATE_US && self.stalls == Some(0))
     }
 }
 
@@ -260,6 +261,23 @@ mod tests {
             "{once}"
         );
         assert!(told(3, 2.0).contains("held 3 times, 2.0 s in all"));
+    }
+
+    #[test]
+    fn what_a_chip_did_late_before_the_run_is_no_busy_computer() {
+        let grown = message::Counters {
+            steps: 1_000,
+            // Of the erasing of its flash, an hour ago.
+            worst_late_us: 1_900_000,
+            ..Default::default()
+        };
+        let summary = |grown| Summary::default().on_chip(&grown, Duration::from_secs(10));
+        assert!(!summary(grown).too_busy());
+        let late = message::Counters {
+            late_steps: 21,
+            ..grown
+        };
+        assert!(summary(late).too_busy());
     }
 
     #[test]

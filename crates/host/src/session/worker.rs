@@ -7,7 +7,7 @@ use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::{Activation, Instant, Status};
 
 use super::calibrating::told;
-use super::hub::{Happened, Hub, Said, Totals};
+use super::hub::{Happened, Hub, Said};
 use super::orders::{Order, Queue};
 use super::record::{Command, Feed, Frame, Imu, Record, Sort};
 use super::slots::MemorySlot;
@@ -200,7 +200,8 @@ impl Worker {
             status: telemetry.status_sequence,
         };
         let useless = telemetry.frame_sequence > 0 && !telemetry.angles_valid;
-        said.totals = Totals::InProcess(telemetry.counters, self.scheduling);
+        said.totals
+            .here(&telemetry.counters, telemetry.now, self.scheduling);
         said.say(Snapshot::from(&telemetry), useless);
     }
 

@@ -3,9 +3,9 @@
 use std::time::{Duration, Instant};
 
 use bridge::clutch::HeartbeatRefusal;
-use bridge::protocol::message::{Answer, Call, Counters, Devices, Refusal, Status};
+use bridge::protocol::message::{Answer, Call, Counters, Devices, Health, Refusal, Status};
 
-use super::{Epoch, Error, HostLink, as_status, confused};
+use super::{Epoch, Error, HostLink, as_health, as_status, confused};
 
 /// For a heartbeat: the next one is due then.
 const HEARTBEAT_WAIT: Duration = Duration::from_millis(100);
@@ -58,6 +58,25 @@ impl HostLink {
     /// As [`HostLink::call`].
     pub fn release(&mut self) -> Result<Status, Error> {
         as_status(self.call(&Call::Release)?)
+    }
+
+    /// What it is doing, where the answer comes by `end`: asked once, so that no order waits for it.
+    ///
+    /// # Errors
+    /// As [`HostLink::counters_by`].
+    pub fn status_by(&mut self, end: Instant) -> Result<Option<Status>, Error> {
+        let answer = self.ask_by(&Call::Status, end)?.flatten();
+        answer.map(as_status).transpose()
+    }
+
+    /// The same as [`HostLink::health`], where the answer comes by `end`: asked once.
+    ///
+    /// # Errors
+    /// As [`HostLink::counters_by`], and [`Error::Older`] from a bridge of an older version.
+    pub fn health_by(&mut self, end: Instant) -> Result<Option<Health>, Error> {
+        self.require_own_version("calibration")?;
+        let answer = self.ask_by(&Call::Health, end)?.flatten();
+        answer.map(as_health).transpose()
     }
 
     /// What it has counted, where the answer comes by `end`: asked once, so that no heartbeat waits for it.

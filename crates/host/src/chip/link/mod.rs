@@ -277,10 +277,7 @@ impl HostLink {
     /// As [`HostLink::call`], and [`Error::Older`] from a bridge of an older version.
     pub fn health(&mut self) -> Result<Health, Error> {
         self.require_own_version("calibration")?;
-        match self.call(&Call::Health)? {
-            Answer::Health(health) => Ok(health),
-            other => Err(confused(&other)),
-        }
+        as_health(self.call(&Call::Health)?)
     }
 
     /// Takes the hand, flat and still, as all joints at zero; [`HostLink::health`] tells how it ended.
@@ -363,6 +360,13 @@ impl HostLink {
 fn as_status(answer: Answer) -> Result<Status, Error> {
     match answer {
         Answer::Status(status) => Ok(status),
+        other => Err(confused(&other)),
+    }
+}
+
+fn as_health(answer: Answer) -> Result<Health, Error> {
+    match answer {
+        Answer::Health(health) => Ok(health),
         other => Err(confused(&other)),
     }
 }
