@@ -14,7 +14,6 @@ use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::lines::list;
-use host::next::Command;
 
 /// Options of `doctor`.
 #[derive(Debug, Args)]
@@ -152,10 +151,7 @@ fn only_ports(as_json: bool) -> Result<()> {
         .into());
     }
     if !as_json {
-        let doctor = Command::gauntlet("doctor")
-            .option("--gripper", "PORT")
-            .option("--glove", "PORT");
-        say!("name a device for more: {doctor}");
+        say!("for more, the same with --gripper or --glove and one of these ports");
     }
     Ok(())
 }

@@ -72,8 +72,7 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
         .for_each(|line| tell.say(format_args!("{line}")));
     if let Some((there, announced)) = status.transfer {
         tell.say(format_args!(
-            "transfer   {there} of {announced} bytes, not ended: `{}` goes on with it, `{}` gives it up",
-            at.command("flash MODEL"),
+            "transfer   {there} of {announced} bytes, not ended: flashing the same file goes on with it, `{}` gives it up",
             at.command("bridge reboot")
         ));
     }

@@ -126,7 +126,7 @@ fn not_moved(options: &Demo) -> anyhow::Error {
         true => {
             "the same on a machine with less to do, without --json, whose lines say what held it"
         }
-        false => "--log FILE.mcap, whose events say what held it",
+        false => "the same with --log and a new file's name, whose events say what held it",
     };
     Failure::new("the gripper did not move with the hand", next).into()
 }

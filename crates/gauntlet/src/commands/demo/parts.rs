@@ -22,7 +22,7 @@ use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::lines::port::BAUD;
-use host::next::Command;
+use host::next::{Command, NextStep, advice};
 use host::realtime;
 use host::session::Snapshot;
 use host::stats::seconds;
@@ -68,15 +68,16 @@ pub(super) fn trained(
         "training   {} and {PAIRS} chosen where they help most; a scripted operator shows the hand poses;",
         if options.no_start_pairs { "no start pairs" } else { "2 start pairs (open hand, fist)" }
     ));
-    let paper = match &options.poses {
-        Some(poses) => Command::gauntlet("train").path("--poses", poses),
-        None => Command::gauntlet("train").option("--poses", "FILE.csv"),
+    let paper: NextStep = match &options.poses {
+        Some(poses) => Command::gauntlet("train")
+            .path("--poses", poses)
+            .option("--schedule", "paper")
+            .option("--out", "model.safetensors")
+            .into(),
+        None => advice("train --schedule paper, with a recording of a hand"),
     };
-    let paper = paper
-        .option("--schedule", "paper")
-        .option("--out", "model.safetensors");
     tell.say(format_args!(
-        "           fast schedule, {} epochs (the paper's is 8,000 + 100 a pair: `{paper}`)",
+        "           fast schedule, {} epochs (the paper's is 8,000 + 100 a pair: {paper})",
         request.total_epochs()
     ));
     let outcome = train(&request, interrupt)?;

@@ -89,12 +89,12 @@ fn unmeasured(options: &Train) -> anyhow::Error {
         "interrupted while the map was measured: the model is whole in {out}, without its measures"
     );
     let eval = Command::gauntlet("eval").path("--model", &options.out);
-    let next = match (&options.poses, &options.input, &options.target) {
-        (None, Some(input), Some(target)) => eval.path("--input", input).path("--target", target),
-        (poses, ..) => {
-            let poses = poses.as_deref().unwrap_or(Path::new("FILE.csv"));
-            eval.path("--poses", poses)
+    let next: NextStep = match (&options.poses, &options.input, &options.target) {
+        (None, Some(input), Some(target)) => {
+            eval.path("--input", input).path("--target", target).into()
         }
+        (Some(poses), ..) => eval.path("--poses", poses).into(),
+        (None, ..) => "measuring it with eval".into(),
     };
     Failure::new(what, next).into()
 }

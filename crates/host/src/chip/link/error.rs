@@ -186,13 +186,6 @@ impl Error {
     }
 }
 
-/// For who does not know where the bridge is: PORT stands for it in commands.
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        error.at(&Address::Serial("PORT".into()))
-    }
-}
-
 /// What a refusal means.
 pub fn refusal_words(refusal: &Refusal) -> String {
     match refusal {
@@ -242,8 +235,7 @@ pub fn refusal_next(refusal: &Refusal, bridge: &Address) -> NextStep {
             "opening the clutch first: end the `bridge engage` that keeps it closed, or, where its host is gone, ",
         )
         .then(command("bridge release")),
-        Refusal::Store(bridge::store::Error::Busy) => command("flash MODEL")
-            .then(" with the same file, which goes on; or ")
+        Refusal::Store(bridge::store::Error::Busy) => advice("flashing the same file again, which goes on; or ")
             .then(command("bridge reboot"))
             .then(", which gives the image up"),
         Refusal::Store(error) => error.remedy().to_string().into(),
