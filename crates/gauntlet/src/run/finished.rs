@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::results::runs;
 use crate::tell::Tell;
-use host::failure::{Failure, with_others};
+use host::failure::{Failure, Told, with_others};
 use host::recording::Written;
 use host::session::{Devices, Ending, Stopped, Summary};
 
@@ -32,13 +32,14 @@ impl Finished {
         stopped.judge(&self.devices).ok()
     }
 
-    /// All of it as data.
-    pub fn result(&self) -> runs::Run<'_> {
+    /// All of it as data, with what the judgement was.
+    pub fn result(&self, failure: Option<Told>) -> runs::Run<'_> {
         runs::Run {
             gripper: self.stopped.as_ref().ok().copied(),
             run: &self.summary,
             log: self.log.as_ref(),
             poses: None,
+            failure,
         }
     }
 
@@ -63,7 +64,7 @@ impl Finished {
     ///
     /// # Errors
     /// As [`Finished::judge_prepared`].
-    pub fn judge<T>(self, driven: Result<T>) -> Result<T> {
+    pub fn judge<T>(&mut self, driven: Result<T>) -> Result<T> {
         let driven = match self.ending {
             Some(_) => driven,
             None => driven.and_then(|_| Err(self.interrupted().into())),
@@ -93,12 +94,14 @@ impl Finished {
     ///
     /// # Errors
     /// The first of the failures; the others are told after it.
-    pub fn judge_prepared<T>(self, driven: Result<T>) -> Result<T> {
-        let stopped = self
-            .stopped
-            .and_then(|stopped| stopped.judge(&self.devices).map(drop));
+    pub fn judge_prepared<T>(&mut self, driven: Result<T>) -> Result<T> {
+        let stopped = match &self.stopped {
+            Ok(stopped) => stopped.judge(&self.devices).map(drop),
+            // The failure is told in the judgement; that there is one stays.
+            Err(_) => std::mem::replace(&mut self.stopped, Err(anyhow::anyhow!("it failed"))).map(drop),
+        };
         let judge = |ending: Ending| ending.judge(&self.devices);
-        let ending = self.ending.map_or(Ok(()), judge);
+        let ending = self.ending.clone().map_or(Ok(()), judge);
         let log = self.log.as_ref().map_or(Ok(()), Written::judge);
         first_failure(stopped, driven, [ending, log])
     }
@@ -170,7 +173,7 @@ mod tests {
         }
     }
 
-    fn told(finished: Finished, driven: Result<()>) -> String {
+    fn told(mut finished: Finished, driven: Result<()>) -> String {
         finished.judge(driven).unwrap_err().to_string()
     }
 
@@ -190,7 +193,7 @@ mod tests {
         assert!(told(held, Ok(())).contains("gripper no longer answers"));
         let held = finished(Ok(Stopped::Held), Some(well()), Some("disk full"));
         assert!(told(held, Ok(())).contains("incomplete: disk full"));
-        let well = finished(Ok(Stopped::Held), Some(well()), None);
+        let mut well = finished(Ok(Stopped::Held), Some(well()), None);
         assert!(well.judge(Ok(())).is_ok());
     }
 
@@ -241,7 +244,7 @@ mod tests {
             let text = told(run, Ok(()));
             assert!(text.contains(words), "{text}");
         }
-        let prepared = finished(Ok(Stopped::Untouched), None, None);
+        let mut prepared = finished(Ok(Stopped::Untouched), None, None);
         assert!(prepared.judge_prepared(Ok(())).is_ok());
     }
 
@@ -256,7 +259,7 @@ mod tests {
                 held: Some(held),
                 ..well()
             };
-            let run = finished(Ok(Stopped::Held), Some(ending), None);
+            let mut run = finished(Ok(Stopped::Held), Some(ending), None);
             assert!(run.judge(Ok(())).is_ok(), "{held:?}");
         }
     }

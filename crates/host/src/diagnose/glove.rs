@@ -122,8 +122,8 @@ fn find(
             return None;
         }
     }
-    if let Some((what, next)) = list::latency_fault(path) {
-        findings.wrong("port", what, next);
+    if let Some(slow) = list::latency_warning(path) {
+        findings.wrong("port", slow.what, slow.next);
     }
     let mut seen = Vec::new();
     for &baud in bauds {

@@ -82,8 +82,8 @@ fn serial(place: &Place<'_>, thorough: bool, findings: &mut Findings, interrupt:
         Err(error) => return findings.failure("port", &Failure::from(error)),
     };
     findings.good("port", format!("{} opens", place.path.display()));
-    if let Some((what, next)) = list::latency_fault(place.path) {
-        findings.note("port", what, next);
+    if let Some(slow) = list::latency_warning(place.path) {
+        findings.note("port", slow.what, slow.next);
     }
     let tally = exchanges(&mut port, unit, baud, interrupt);
     if tally.is_answered() {

@@ -29,6 +29,7 @@ pub use pairs::{PairChoice, PairKind};
 
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::next::Warning;
 use crate::training::quality::Measured;
 
 /// Share of the frames that train; the rest measure (381 + 254 of the paper's 635).
@@ -194,7 +195,7 @@ pub struct Learned {
     /// How long it took.
     pub took: Duration,
     /// What a person should know.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 impl Task {

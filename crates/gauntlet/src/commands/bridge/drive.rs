@@ -38,7 +38,7 @@ pub(super) fn engage(
         true => drive(&mut run, "gauntlet bridge engage", seconds, true, at.json),
         false => Ok(()),
     });
-    let finished = run.finish();
+    let mut finished = run.finish();
     if !began {
         return finished.judge(driven);
     }
@@ -160,14 +160,15 @@ pub(super) fn log(
 fn finish(
     verb: &'static str,
     at: &BridgeAt,
-    finished: Finished,
+    mut finished: Finished,
     poses: Option<runs::Poses<'_>>,
     driven: Result<()>,
 ) -> Result<()> {
+    let (judgement, failure) = results::judged(finished.judge(driven));
     if at.json {
         let result = runs::Run {
             poses,
-            ..finished.result()
+            ..finished.result(failure)
         };
         results::print(verb, result)?;
     } else {
@@ -177,5 +178,5 @@ fn finish(
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
     }
-    finished.judge(driven)
+    judgement
 }

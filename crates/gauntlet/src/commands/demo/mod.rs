@@ -48,8 +48,17 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         home,
         ..
     } = started;
-    let finished = run.finish();
+    let mut finished = run.finish();
     drop(home);
+    if !options.json || finished.ending.is_none() {
+        say(&finished, &outcome.quality.line(), &tell);
+    }
+    let moved = finished.summary.first_motion_s.is_some();
+    let judgement = finished.judge(driven).and_then(|end| match end {
+        End::Time if !moved => Err(not_moved(options)),
+        End::Time | End::Asked => Ok(()),
+    });
+    let (judgement, failure) = results::judged(judgement);
     if options.json && finished.ending.is_some() {
         let result = runs::Demo {
             motion: motion.describe(),
@@ -58,17 +67,11 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             pairs: outcome.pairs,
             quality: &outcome.quality,
             flash: flashed.as_ref(),
-            run: finished.result(),
+            run: finished.result(failure),
         };
         results::print("demo", result)?;
-    } else {
-        say(&finished, &outcome.quality.line(), &tell);
     }
-    let moved = finished.summary.first_motion_s.is_some();
-    match finished.judge(driven)? {
-        End::Time if !moved => Err(not_moved(options)),
-        End::Time | End::Asked => Ok(()),
-    }
+    judgement
 }
 
 /// Brings everything up, activates, engages, runs.
