@@ -65,11 +65,19 @@ impl Finished {
     /// # Errors
     /// As [`Finished::judge_prepared`].
     pub fn judge<T>(&mut self, driven: Result<T>) -> Result<T> {
+        self.judge_with(driven, Ok(()))
+    }
+
+    /// The same where besides a file of whoever drove was written.
+    ///
+    /// # Errors
+    /// As [`Finished::judge_prepared`].
+    pub fn judge_with<T>(&mut self, driven: Result<T>, written: Result<()>) -> Result<T> {
         let driven = match self.ending {
             Some(_) => driven,
             None => driven.and_then(|_| Err(self.interrupted().into())),
         };
-        self.judge_prepared(driven)
+        self.judge_all(driven, written)
     }
 
     /// Ended before driving began: what was done and what was not.
@@ -95,6 +103,10 @@ impl Finished {
     /// # Errors
     /// The first of the failures; the others are told after it.
     pub fn judge_prepared<T>(&mut self, driven: Result<T>) -> Result<T> {
+        self.judge_all(driven, Ok(()))
+    }
+
+    fn judge_all<T>(&mut self, driven: Result<T>, written: Result<()>) -> Result<T> {
         let stopped = match &self.stopped {
             Ok(stopped) => stopped.judge(&self.devices).map(drop),
             // The failure is told in the judgement; that there is one stays.
@@ -103,7 +115,7 @@ impl Finished {
         let judge = |ending: Ending| ending.judge(&self.devices);
         let ending = self.ending.clone().map_or(Ok(()), judge);
         let log = self.log.as_ref().map_or(Ok(()), Written::judge);
-        first_failure(stopped, driven, [ending, log])
+        first_failure(stopped, driven, [ending, log, written])
     }
 }
 
@@ -227,6 +239,23 @@ mod tests {
             let text = told(run, Ok(()));
             assert!(text.contains(word), "{text}");
         }
+    }
+
+    #[test]
+    fn a_file_that_could_not_be_written_is_told_with_the_judgement_and_the_numbers_stay() {
+        let full = || Err(Failure::new("the log hand.csv: the disk is full", "room").into());
+        let mut alone = finished(Ok(Stopped::Held), Some(well()), None);
+        let error = alone.judge_with(Ok(()), full()).unwrap_err();
+        assert!(error.to_string().contains("hand.csv"), "{error}");
+        assert_eq!(alone.result(None).gripper, Some(Stopped::Held));
+        let lost = Ending {
+            glove_answers: false,
+            ..well()
+        };
+        let mut second = finished(Ok(Stopped::Held), Some(lost), None);
+        let told = Told::of(&second.judge_with(Ok(()), full()).unwrap_err());
+        assert!(told.error.contains("glove no longer sends"), "{told:?}");
+        assert!(told.also[0].contains("hand.csv"), "{told:?}");
     }
 
     #[test]
