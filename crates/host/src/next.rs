@@ -8,7 +8,8 @@
 use std::fmt;
 use std::path::Path;
 
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use serde::Serialize;
+use serde::ser::{SerializeStruct, Serializer};
 
 /// A command line: the program and its arguments, each as the program gets it.
 #[derive(Debug, Clone, PartialEq, Eq)]

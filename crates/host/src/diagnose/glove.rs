@@ -181,12 +181,12 @@ fn bridge(baud: u32, status: u8, findings: &mut Findings) {
         RESET_BAUD => findings.note(
             "bridge",
             format!("{what}, as after power-on"),
-            "nothing: `teleop` switches it to 115200",
+            "nothing: teleop switches it to 115200",
         ),
         _ => findings.wrong(
             "bridge",
             format!("{what}: another program left it there"),
-            "unplug the glove and plug it in again: it then speaks 9600 baud, which `teleop` expects",
+            "unplug the glove and plug it in again: it then speaks 9600 baud, which teleop expects",
         ),
     }
     // The status is that of the last transfer, which may have been somebody else's.

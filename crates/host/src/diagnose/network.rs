@@ -208,7 +208,7 @@ impl Tally {
             patience.as_millis()
         );
         let next = place.with_patience(needed).command("gripper status");
-        let next = next.then(" (`teleop` takes --patience too); a network without the delay");
+        let next = next.then(" (teleop takes --patience too); a network without the delay");
         if *middle <= patience {
             findings.note("connection", what, next);
             return None;

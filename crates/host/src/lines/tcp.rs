@@ -96,7 +96,7 @@ impl Error {
                 "whether this is the gripper's address, and its Modbus TCP port (502 by default)"
             }
             Self::Unreachable | Self::System(_) => {
-                "`ping` the gripper; its power, the network cable, and that the PC has an address in the same network"
+                "whether the gripper answers a ping; its power, the network cable, and that the PC has an address in the same network"
             }
             Self::Timeout => {
                 "ending other programs that are connected to it; the same with --patience 500; --unit with another unit number (2 by default); the gripper's power"

@@ -113,7 +113,9 @@ fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
         .and_then(|(handle, _)| handle)
         .or_fail(
             || format!("the virtual {name} gets no pseudo-terminal"),
-            "ending programs that hold many of them (`ls /dev/pts`)",
+            advice("ending programs that hold many of them (")
+                .then(Command::program("ls").word("/dev/pts"))
+                .then(")"),
         )
 }
 

@@ -159,9 +159,9 @@ impl Error {
             Self::Silent { heard, .. } if heard.unknown > 0 => {
                 "the tool and the firmware of the same release".into()
             }
-            Self::Older { .. } => {
-                "this release's firmware in the bridge: `cargo xtask firmware` builds it; weights can be flashed as it is".into()
-            }
+            Self::Older { .. } => advice("this release's firmware in the bridge: ")
+                .then(crate::chip::firmware())
+                .then(" builds it; weights can be flashed as it is"),
             Self::Silent { heard, .. } if heard.echoes > 0 => {
                 "the wiring: the line sends back what is sent to it, and no bridge answers; TX and RX bridged, or a program that echoes".into()
             }
@@ -232,7 +232,7 @@ pub fn refusal_next(refusal: &Refusal, bridge: &Address) -> NextStep {
         Refusal::NoSession => "the same command again".into(),
         Refusal::Busy { .. } => "ending the other program, then 2 s of patience".into(),
         Refusal::Engaged | Refusal::Store(bridge::store::Error::Engaged) => advice(
-            "opening the clutch first: end the `bridge engage` that keeps it closed, or, where its host is gone, ",
+            "opening the clutch first: end the bridge engage that keeps it closed, or, where its host is gone, ",
         )
         .then(command("bridge release")),
         Refusal::Store(bridge::store::Error::Busy) => advice("flashing the same file again, which goes on; or ")
