@@ -259,7 +259,10 @@ fn results_of_devices_keep_their_names() {
         serial_number: Some("A".to_owned()),
         stable_path: Some("/dev/serial/by-id/usb-FTDI_A".into()),
         latency_timer_ms: Some(16),
-        warnings: vec![Warning::new("its latency timer is 16 ms", Command::program("sudo").word("sh"))],
+        warnings: vec![Warning::new(
+            "its latency timer is 16 ms",
+            Command::program("sudo").word("sh"),
+        )],
     }];
     let finding = |verdict, next| Finding {
         layer: "line",

@@ -110,7 +110,9 @@ impl Finished {
         let stopped = match &self.stopped {
             Ok(stopped) => stopped.judge(&self.devices).map(drop),
             // The failure is told in the judgement; that there is one stays.
-            Err(_) => std::mem::replace(&mut self.stopped, Err(anyhow::anyhow!("it failed"))).map(drop),
+            Err(_) => {
+                std::mem::replace(&mut self.stopped, Err(anyhow::anyhow!("it failed"))).map(drop)
+            }
         };
         let judge = |ending: Ending| ending.judge(&self.devices);
         let ending = self.ending.clone().map_or(Ok(()), judge);

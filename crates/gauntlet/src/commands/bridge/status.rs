@@ -110,7 +110,8 @@ fn warnings(status: &Status, health: Option<&Health>, at: &BridgeAt) -> Vec<Warn
         let next = advice("flashing the same file again, which goes on; or ")
             .then(at.command("bridge reboot"))
             .then(", which gives it up");
-        let what = format!("{there} of {announced} bytes of a weights image came, and it did not end");
+        let what =
+            format!("{there} of {announced} bytes of a weights image came, and it did not end");
         warnings.push(Warning::new(what, next));
     }
     let calibration = health.map(|health| health.calibration);

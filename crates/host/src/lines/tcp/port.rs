@@ -15,11 +15,10 @@ use tokio::sync::mpsc;
 
 use super::task::{self, Answers, Done, Job};
 use super::{Address, BLOCK, CONNECT, EXCHANGE, Error, State, lock};
-use crate::clock::Clock;
+use crate::clock::{Clock, ticks};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 use crate::lines::port::Watch;
-use crate::lines::ticks;
 
 /// Answers that may lie there; more than one only after the driver gave up waiting.
 const ANSWERS: usize = 4;
