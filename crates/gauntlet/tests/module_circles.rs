@@ -41,7 +41,10 @@ fn modules(folder: &Path, name: &str, all: &mut BTreeMap<String, String>) {
 fn bare(text: &str) -> String {
     let code = text.split("#[cfg(test)]").next().unwrap();
     let mut kept = String::new();
-    for line in code.lines().filter(|line| !line.trim_start().starts_with("//")) {
+    for line in code
+        .lines()
+        .filter(|line| !line.trim_start().starts_with("//"))
+    {
         let mut inside = false;
         let mut escaped = false;
         for (at, c) in line.char_indices() {
@@ -105,7 +108,10 @@ impl Crate {
     fn from_root(&self, module: &str, path: &str) -> Option<Words> {
         let mut at: Words = module.split("::").map(str::to_owned).collect();
         at.retain(|word| !word.is_empty());
-        let mut words: Words = path.split("::").map(|word| word.trim().to_owned()).collect();
+        let mut words: Words = path
+            .split("::")
+            .map(|word| word.trim().to_owned())
+            .collect();
         match words[0].as_str() {
             "crate" => {
                 words.remove(0);
@@ -130,10 +136,6 @@ impl Crate {
     fn needed(&mut self) -> BTreeMap<String, Vec<Words>> {
         let mut needed: BTreeMap<String, Vec<Words>> = BTreeMap::new();
         for (module, code) in &self.modules {
-            let mut rest = String::new();
-            for statement in code.split_inclusive([';', '{', '}']) {
-                rest.push_str(statement);
-            }
             let paths = needed.entry(module.clone()).or_default();
             let mut body = String::new();
             let mut lines = code.lines();
@@ -260,11 +262,17 @@ fn a_circle_is_found_by_way_of_a_third_and_a_front_is_none() {
         ("", "pub mod a;\npub mod b;"),
         ("a", "use crate::{b::{self, B}};"),
         ("b", "fn f() { super::c::g() }"),
-        ("c", "// of `a`\nuse crate::a::{\n    A,\n};\nconst A: &str = \"crate::b\";"),
+        (
+            "c",
+            "// of `a`\nuse crate::a::{\n    A,\n};\nconst A: &str = \"crate::b\";",
+        ),
     ]);
     assert_eq!(round.circles(), [["a", "b", "c"]]);
     let front = source(&[
-        ("a", "mod one;\nmod two;\npub use one::One;\npub struct Zero;"),
+        (
+            "a",
+            "mod one;\nmod two;\npub use one::One;\npub struct Zero;",
+        ),
         ("a::one", "use super::Zero;"),
         ("a::two", "use super::One;"),
     ]);

@@ -8,8 +8,8 @@ use anyhow::Result;
 use trainer::algorithm::{InUnits, Trainer};
 use trainer::remedy::Remedy;
 
+use super::task::{Course, Ended, Learned, Task};
 use super::told::Told;
-use super::{Course, Ended, Learned, Task};
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::next::{Command, NextStep, Warning};

@@ -13,8 +13,9 @@ use gripper::registers::{COMMAND, STATUS};
 use gripper::rtu::{Registers, Request, Response, function};
 use tokio::sync::mpsc;
 
+use super::address::Address;
+use super::state::{BLOCK, CONNECT, EXCHANGE, Error, State, lock};
 use super::task::{self, Answers, Done, Job};
-use super::{Address, BLOCK, CONNECT, EXCHANGE, Error, State, lock};
 use crate::clock::{Clock, ticks};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
