@@ -16,7 +16,7 @@ use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::stats::seconds;
 use host::training::motion::Motion;
-use parts::Started;
+use parts::{Stage, Started};
 
 pub use args::Demo;
 
@@ -39,7 +39,12 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         true => on_chip::start,
         false => here::start,
     };
-    let mut started = start(options, &motion, &tell, interrupt)?;
+    let mut started = start(Stage {
+        options,
+        motion: &motion,
+        tell: &tell,
+        interrupt,
+    })?;
     let driven = drive(options, &mut started, &tell);
     let Started {
         run,

@@ -33,6 +33,26 @@ use host::training::{Outcome, Request, train};
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
 
+/// What both homes of the bridge are started with.
+#[derive(Clone, Copy)]
+pub(super) struct Stage<'a> {
+    pub(super) options: &'a Demo,
+    pub(super) motion: &'a Motion,
+    pub(super) tell: &'a Tell,
+    pub(super) interrupt: &'a Interrupt,
+}
+
+impl Stage<'_> {
+    /// What is virtual and what is not, and what moves.
+    pub(super) fn introduce(&self, rest: &str) {
+        self.tell.say(format_args!(
+            "gauntlet demo: glove and gripper are virtual, {rest}"
+        ));
+        let motion = self.motion.describe();
+        self.tell.say(format_args!("motion     {motion}"));
+    }
+}
+
 /// A bridge that runs between virtual devices.
 pub(super) struct Started {
     pub(super) run: Run,
@@ -48,12 +68,13 @@ pub(super) struct Started {
     pub(super) frame_wait: Duration,
 }
 
-pub(super) fn trained(
-    options: &Demo,
-    motion: &Motion,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<Outcome> {
+pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
+    let Stage {
+        options,
+        motion,
+        tell,
+        interrupt,
+    } = stage;
     let request = Request {
         motion,
         space: Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
