@@ -105,7 +105,7 @@ impl Crate {
     }
 
     /// The path `path` in `module`, from the root; `None` for another crate's.
-    fn from_root(&self, module: &str, path: &str) -> Option<Words> {
+    fn absolute(&self, module: &str, path: &str) -> Option<Words> {
         let mut at: Words = module.split("::").map(str::to_owned).collect();
         at.retain(|word| !word.is_empty());
         let mut words: Words = path
@@ -152,7 +152,7 @@ impl Crate {
                     tree.push_str(lines.next().unwrap());
                 }
                 for path in expanded(tree.split(';').next().unwrap()) {
-                    let Some(path) = self.from_root(module, &path) else {
+                    let Some(path) = self.absolute(module, &path) else {
                         continue;
                     };
                     let below = path.join("::").starts_with(&format!("{module}::"));
@@ -168,7 +168,7 @@ impl Crate {
             let apart = |c: char| !(c.is_alphanumeric() || c == '_' || c == ':');
             let inline = body.split(apart).filter(|word| word.contains("::"));
             let inline = inline.map(|word| word.trim_matches(':'));
-            paths.extend(inline.filter_map(|path| self.from_root(module, path)));
+            paths.extend(inline.filter_map(|path| self.absolute(module, path)));
         }
         needed
     }

@@ -15,7 +15,6 @@ use host::lines::Model;
 use host::next::Command;
 use host::session::Devices;
 use host::training::model;
-use host::training::motion::Motion;
 
 /// Whether there can be such a demo.
 ///

@@ -311,13 +311,9 @@ fn an_image_that_did_not_end_is_told_with_commands_that_a_person_can_type() {
     let at = Address::Serial("/dev/b".into());
     let next = refusal_next(&Refusal::Store(bridge::store::Error::Busy), &at);
     let commands: Vec<String> = next.commands().map(ToString::to_string).collect();
-    assert_eq!(
-        commands,
-        [
-            "gauntlet flash MODEL --bridge /dev/b",
-            "gauntlet bridge reboot --bridge /dev/b"
-        ]
-    );
+    // Which file it was is not known here.
+    assert!(next.to_string().starts_with("flashing the same file again"));
+    assert_eq!(commands, ["gauntlet bridge reboot --bridge /dev/b"]);
 }
 
 #[test]
