@@ -9,7 +9,6 @@ use bridge::protocol::message::{Answer, Call, Refusal, Restart};
 use bridge::{HoldReason, State};
 use hae::image::JointOrder;
 use host::chip::link::{Error, HostLink};
-use host::failure::Failure;
 use host::interrupt::Interrupt;
 use loop_tests::chip::firmware;
 use loop_tests::debugger;
@@ -201,7 +200,7 @@ fn bad_images_are_refused_in_words_and_leave_the_bridge_as_it_was() {
     let before = link.slots().expect("an answer");
     for (what, image, word) in bad_images() {
         let refused = flash(&mut link, &image).expect_err(what);
-        let failure = Failure::from(refused);
+        let failure = refused.at(&emulator.address());
         println!("{what}: {failure}; try {}", failure.next_step());
         assert!(failure.to_string().contains(word), "{what}: {failure}");
         assert!(!failure.next_step().is_empty(), "{what}");
@@ -290,7 +289,8 @@ fn a_host_that_vanishes_while_engaged_leaves_a_hold_that_the_next_one_can_end() 
         status.engaged && !status.heartbeat && !status.state.is_moving(),
         "{status:?}"
     );
-    let refused = Failure::from(flash(&mut next, &index_finger(6)).expect_err("a hold"));
+    let refused = flash(&mut next, &index_finger(6)).expect_err("a hold");
+    let refused = refused.at(&emulator.address());
     assert!(
         refused.next_step().contains("gauntlet bridge release"),
         "{refused}; try {}",

@@ -10,6 +10,27 @@ const LOG: &str = "GAUNTLET_SKIPS";
 /// The variable that makes skips errors.
 const REQUIRE: &str = "GAUNTLET_REQUIRE";
 
+/// What a step of the chore lacks: the words are those of the tests' skips (`rig::skip`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// The microcontroller's builds, its compiler, QEMU (`chip`).
+    Chip,
+}
+
+impl Kind {
+    fn word(self) -> &'static str {
+        match self {
+            Self::Chip => "chip",
+        }
+    }
+}
+
+/// Whether `required` allows no skip of this kind.
+fn is_required(required: &str, kind: Kind) -> bool {
+    let mut words = required.split(',').map(str::trim);
+    words.any(|word| word == "all" || word == kind.word())
+}
+
 /// The skips of one run.
 pub struct Skips {
     file: PathBuf,
@@ -33,13 +54,13 @@ impl Skips {
         command.env(LOG, &self.file);
     }
 
-    /// A step that the chore itself leaves out. An error where all is required.
-    pub fn add(&mut self, what: &str, why: &str) -> Result<(), Failure> {
+    /// A step that the chore itself leaves out. An error where all is required, or this kind.
+    pub fn add(&mut self, kind: Kind, what: &str, why: &str) -> Result<(), Failure> {
         println!("skipped: {what}: {why}");
         let required = std::env::var(REQUIRE).unwrap_or_default();
-        if required.split(',').any(|word| word.trim() == "all") {
+        if is_required(&required, kind) {
             return Err(format!(
-                "{REQUIRE}={required} allows no skip: {what}: {why}"
+                "{REQUIRE}={required} allows no such skip: {what}: {why}"
             ));
         }
         self.own.push(format!("{what}: {why}"));
@@ -132,6 +153,16 @@ mod tests {
             ]
         );
         assert!(summary(&[], "").is_empty());
+    }
+
+    #[test]
+    fn a_step_that_is_left_out_is_an_error_where_its_kind_is_required() {
+        for required in ["all", "chip", "chip,machine", "shared, chip"] {
+            assert!(is_required(required, Kind::Chip), "{required}");
+        }
+        for required in ["", "machine,shared", "chips"] {
+            assert!(!is_required(required, Kind::Chip), "{required}");
+        }
     }
 
     #[test]

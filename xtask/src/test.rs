@@ -2,7 +2,7 @@
 
 use crate::figures::Mode;
 use crate::setup::{self, Leave};
-use crate::skips::Skips;
+use crate::skips::{Kind, Skips};
 use crate::step::{self, Failure, cargo};
 use crate::{firmware, thumb};
 use std::path::{Path, PathBuf};
@@ -74,7 +74,11 @@ fn all(Options { scope, leave }: Options, skips: &mut Skips) -> Result<(), Failu
     let firmware = match scope {
         Scope::Everything => Some(on_chip(skips)?),
         Scope::HostOnly => {
-            skips.add("the microcontroller's builds and counts", "--host-only")?;
+            skips.add(
+                Kind::Chip,
+                "the microcontroller's builds and counts",
+                "--host-only",
+            )?;
             None
         }
     };
@@ -105,7 +109,11 @@ fn on_chip(skips: &mut Skips) -> Result<PathBuf, Failure> {
     let elf = firmware::build()?;
     firmware::inspect(&elf, Mode::Check)?;
     if !thumb::is_installed() {
-        skips.add("clippy of the firmware", "Debian's compiler brings none")?;
+        skips.add(
+            Kind::Chip,
+            "clippy of the firmware",
+            "Debian's compiler brings none",
+        )?;
         return Ok(elf);
     }
     let root = step::workspace_root();

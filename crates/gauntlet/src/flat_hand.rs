@@ -94,7 +94,7 @@ impl Hand {
             Some(Wanted::Moving) => false,
             Some(Wanted::Other) => !self.flat,
             None => {
-                say!("`flat`, `move`, or Enter alone for the other of the two");
+                say!("flat, move, or Enter alone for the other of the two");
                 return;
             }
         };

@@ -29,13 +29,18 @@ impl LineOptions {
     /// # Errors
     /// A failure of usage: a speed for a line that has none.
     pub fn settings(&self, path: &Path) -> Result<Settings, Failure> {
-        let settings = Settings {
+        let settings = self.given();
+        settings.check(path)?;
+        Ok(settings)
+    }
+
+    /// The same as it was given, for whoever checks it elsewhere.
+    pub fn given(&self) -> Settings {
+        Settings {
             unit: self.unit,
             baud: self.baud,
             patience: self.patience,
-        };
-        settings.check(path)?;
-        Ok(settings)
+        }
     }
 }
 

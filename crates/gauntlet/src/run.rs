@@ -230,7 +230,7 @@ impl Run {
 
     fn watch(&mut self, options: &Options) -> Result<End> {
         let terminal = || "the terminal does not work".to_owned();
-        let next = "the same with `| cat` behind it, which prints lines instead";
+        let next = "the same with | cat behind it, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;
         let suspend = self.interrupt.catch_suspend().or_fail(
             || "Ctrl-Z cannot be caught".to_owned(),

@@ -120,6 +120,22 @@ fn a_run_whose_glove_gives_nothing_that_can_be_used_until_its_end_has_failed() {
 }
 
 #[test]
+fn a_run_that_failed_says_why_in_its_result_too() {
+    let mut bench = Bench::new(&["--engage", "--json"]);
+    let output = after(&mut bench, |bench| {
+        (0..16).for_each(|k| bench.glove.freeze(k, true));
+        std::thread::sleep(Duration::from_secs(4));
+    });
+    let said: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
+    let failure = &said["failure"];
+    let error = failure["error"].as_str().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(text(&output.stderr).contains(error), "{said}");
+    assert!(error.contains("glove"), "{said}");
+    assert_eq!(failure["commands"][0][1], "doctor", "{said}");
+}
+
+#[test]
 fn a_run_whose_glove_came_back_has_not_failed() {
     let mut bench = Bench::new(&["--engage"]);
     let output = after(&mut bench, |bench| {

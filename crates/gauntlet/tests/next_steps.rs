@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use bridge::calibration::Refusal as NotTaken;
 use bridge::protocol::message::Refusal;
 use bridge::{GripperFault, HoldReason, State};
-use gauntlet::cli::unusable;
+use gauntlet::cli;
 use gripper::{Activation, Fault};
 use host::chip::link::{Address, Error};
 use host::failure::Failure;
@@ -34,15 +34,59 @@ fn bridge_at() -> Address {
     Address::Unix("/tmp/my bridge".into())
 }
 
-/// The next step of a failure, after looking at each of its commands.
-fn usable(error: impl Into<anyhow::Error>) -> NextStep {
+/// What was typed, where a session has its devices there.
+fn typed_at(devices: &Devices) -> Vec<Vec<String>> {
+    let lines: &[&str] = match devices {
+        Devices::Here { .. } => &[
+            "teleop --glove g --gripper h --model m",
+            "teleop --glove g --gripper h --model m --calibrate-flat --engage --activate --seconds 9",
+        ],
+        Devices::Chip(_) => &[
+            "bridge engage --bridge unix:b",
+            "bridge engage --bridge unix:b --calibrate-flat --activate --seconds 9 --json",
+            "bridge calibrate --bridge unix:b",
+            "bridge monitor --bridge unix:b",
+            "bridge log --bridge unix:b --out a.csv",
+        ],
+        // Its devices are gone with it.
+        Devices::Unknown => &["demo", "demo --on-chip", "demo --gripper-model 2f85 --json"],
+    };
+    let words = |line: &&str| {
+        let words = line.split(' ').map(str::to_owned);
+        std::iter::once("gauntlet".to_owned())
+            .chain(words)
+            .collect()
+    };
+    lines.iter().map(words).collect()
+}
+
+/// Why a command cannot be pasted: this tool refuses it, or a word in it stands for one that has to be looked up.
+fn unusable(command: &Command) -> Option<String> {
+    let stands_for_another = |word: &&String| {
+        let name = word.split('.').next().unwrap_or_default();
+        name.len() > 1 && name.chars().all(|c| c.is_ascii_uppercase() || c == '_')
+    };
+    let placeholder = command.words().iter().skip(1).find(stands_for_another);
+    let refused = || cli::unusable(command);
+    placeholder
+        .map(|word| format!("{command}: {word} stands for another word"))
+        .or_else(refused)
+}
+
+/// The next step of a failure of a session with these devices, after looking at each of its commands: as it is, and for
+/// whoever typed what leads there.
+fn usable(error: impl Into<anyhow::Error>, devices: &Devices) -> NextStep {
     let error = error.into();
     let next = error.downcast_ref::<Failure>().unwrap().next().clone();
-    for command in next.commands() {
-        assert_eq!(unusable(command), None, "{error}");
+    let typed = typed_at(devices);
+    let all = typed.iter().map(|words| next.clone().typed(words));
+    for step in all.chain([next.clone()]) {
+        for command in step.commands() {
+            assert_eq!(unusable(command), None, "{error}");
+        }
+        // A placeholder for what is known would have to be looked up.
+        assert!(!step.to_string().contains("PORT"), "{step}");
     }
-    // A placeholder for what is known would have to be looked up.
-    assert!(!next.to_string().contains("PORT"), "{next}");
     next
 }
 
@@ -53,6 +97,9 @@ fn a_command_that_does_not_exist_is_found_out() {
         Command::gauntlet("bridge calibrate"),
         Command::gauntlet("doctor").word("--glove"),
         Command::gauntlet("trian"),
+        Command::gauntlet("flash MODEL").option("--bridge", "/dev/ttyUSB0"),
+        Command::gauntlet("train").option("--poses", "FILE.csv"),
+        Command::gauntlet("demo").word("--calibrate-flat"),
     ];
     for command in wrong {
         assert!(unusable(&command).is_some(), "{command}");
@@ -72,15 +119,15 @@ fn however_a_session_left_its_gripper_the_next_step_names_the_devices() {
     ];
     for devices in everywhere() {
         for stopped in all {
-            usable(stopped.judge(&devices).unwrap_err());
+            usable(stopped.judge(&devices).unwrap_err(), &devices);
         }
     }
     let [here, chip, _] = everywhere();
-    let next = usable(Stopped::NothingWritten.judge(&here).unwrap_err());
+    let next = usable(Stopped::NothingWritten.judge(&here).unwrap_err(), &here);
     let command =
         "gauntlet gripper status --gripper /dev/ttyUSB1 --baud 57600 --unit 5 --gripper-model 2f85";
     assert!(next.to_string().contains(command), "{next}");
-    let next = usable(Stopped::Unheard.judge(&chip).unwrap_err());
+    let next = usable(Stopped::Unheard.judge(&chip).unwrap_err(), &chip);
     let command = "`gauntlet bridge status --bridge 'unix:/tmp/my bridge'`";
     assert!(next.to_string().contains(command), "{next}");
 }
@@ -148,7 +195,7 @@ fn however_a_run_ended_the_next_step_names_the_devices() {
             ..well()
         }));
         for ending in endings {
-            usable(ending.judge(&devices).unwrap_err());
+            usable(ending.judge(&devices).unwrap_err(), &devices);
         }
         for why in [
             NotTaken::Engaged,
@@ -156,13 +203,14 @@ fn however_a_run_ended_the_next_step_names_the_devices() {
             NotTaken::Missing(1),
             NotTaken::NothingBefore,
         ] {
-            usable(refused(why, &devices));
+            usable(refused(why, &devices), &devices);
         }
     }
 }
 
 #[test]
 fn a_refusal_of_a_bridge_names_that_bridge() {
+    let chip = Devices::Chip(bridge_at());
     for refusal in [
         Refusal::NoSession,
         Refusal::Busy { session: 1 },
@@ -170,9 +218,9 @@ fn a_refusal_of_a_bridge_names_that_bridge() {
         Refusal::Store(bridge::store::Error::Busy),
         Refusal::Store(bridge::store::Error::NotBegun),
     ] {
-        usable(Error::Refused(refusal).at(&bridge_at()));
+        usable(Error::Refused(refusal).at(&bridge_at()), &chip);
     }
-    let next = usable(Error::Refused(Refusal::Engaged).at(&bridge_at())).to_string();
+    let next = usable(Error::Refused(Refusal::Engaged).at(&bridge_at()), &chip).to_string();
     let command = "`gauntlet bridge release --bridge 'unix:/tmp/my bridge'`";
     assert!(next.contains(command), "{next}");
 }
@@ -220,29 +268,53 @@ fn a_failure_is_a_result_with_the_next_step_as_data() {
     assert!(stderr.contains(&format!("try: {step}")), "{stderr}");
 }
 
-/// A command in a text would be one that nobody looks at.
+/// A command in a text would be one that nobody looks at, and a backtick around anything else would be no command's.
 #[test]
-fn no_command_of_this_tool_stands_in_a_text() {
+fn no_backtick_stands_in_a_text_but_those_around_a_command() {
     let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let mut files = Vec::new();
-    for part in ["host/src", "gauntlet/src"] {
-        sources(&crates.join(part), &mut files);
+    for part in [
+        "host", "gauntlet", "hae", "glove", "gripper", "bridge", "trainer",
+    ] {
+        sources(&crates.join(part).join("src"), &mut files);
     }
-    assert!(files.len() > 50);
+    assert!(files.len() > 150, "{}", files.len());
     let mut found = Vec::new();
     for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
-        let text = text.split("#[cfg(test)]").next().unwrap();
-        for line in text.lines().map(str::trim_start) {
-            let comment = line.starts_with("//");
-            // The help of the tool as a whole.
-            let help = line.starts_with("`gauntlet help VERB`");
-            if !comment && !help && line.contains("`gauntlet ") {
-                found.push(format!("{}: {line}", file.display()));
-            }
-        }
+        let code = text.split("#[cfg(test)]").next().unwrap();
+        let lines = without_help(code);
+        let wrong = lines.iter().filter(|line| has_backtick(line));
+        found.extend(wrong.map(|line| format!("{}: {line}", file.display())));
     }
     assert!(found.is_empty(), "{found:#?}");
+    for line in ["\"`gauntlet trian`\"", "format!(\"`ping {at}`\")"] {
+        assert!(has_backtick(line), "{line}");
+    }
+    assert!(!has_backtick("format!(\"`{command}` does it\")"));
+}
+
+/// The lines of a source without comments and without the help of the verbs, which people read in a terminal.
+fn without_help(code: &str) -> Vec<&str> {
+    let mut help = false;
+    let mut kept = Vec::new();
+    for line in code.lines().map(str::trim) {
+        help |= line.contains("after_help = \"");
+        if !help && !line.starts_with("//") {
+            kept.push(line);
+        }
+        help &= !line.ends_with("\"") && !line.ends_with("\")]");
+    }
+    kept
+}
+
+/// A backtick that does not stand around a value put in.
+fn has_backtick(line: &str) -> bool {
+    let code = line.split(" // ").next().unwrap_or_default();
+    let mut parts = code.split('`');
+    parts.next();
+    std::iter::from_fn(|| parts.next().map(|inner| (inner, parts.next())))
+        .any(|(inner, after)| after.is_none() || !(inner.starts_with('{') && inner.ends_with('}')))
 }
 
 fn sources(folder: &Path, files: &mut Vec<PathBuf>) {

@@ -19,7 +19,7 @@ use host::chip::link::Flashed;
 use host::diagnose::{Finding, Findings, Verdict};
 use host::failure::{Failure, Told};
 use host::lines::list::Listed;
-use host::next::{Command, advice};
+use host::next::{Command, Warning, advice};
 use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::training::model::Int16;
@@ -170,6 +170,7 @@ fn log() -> Written {
 #[test]
 fn results_of_runs_keep_their_names() {
     let (summary, log, quality, flashed) = (summary(), log(), quality(), flashed());
+    let error = Failure::new("the glove no longer sends frames", "its cable").into();
     let run = || runs::Run {
         gripper: Some(Stopped::Held),
         run: &summary,
@@ -178,6 +179,7 @@ fn results_of_runs_keep_their_names() {
             path: path("hand.csv"),
             rows: 400,
         }),
+        failure: Some(Told::of(&error)),
     };
     let demo = runs::Demo {
         motion: "generated".to_owned(),
@@ -198,7 +200,7 @@ fn results_of_runs_keep_their_names() {
 fn results_of_maps_keep_their_names() {
     let (quality, measured, int16, flashed) = (quality(), measured(), int16(), flashed());
     let metadata = BTreeMap::from([("cost".to_owned(), "hae".to_owned())]);
-    let warnings = ["a column is constant".to_owned()];
+    let warnings = [Warning::new("a column is constant", "")];
     let trained = maps::Trained {
         model: path("model.safetensors"),
         epochs: 1_000,
@@ -257,7 +259,10 @@ fn results_of_devices_keep_their_names() {
         serial_number: Some("A".to_owned()),
         stable_path: Some("/dev/serial/by-id/usb-FTDI_A".into()),
         latency_timer_ms: Some(16),
-        warnings: vec!["its latency timer is 16 ms".to_owned()],
+        warnings: vec![Warning::new(
+            "its latency timer is 16 ms",
+            Command::program("sudo").word("sh"),
+        )],
     }];
     let finding = |verdict, next| Finding {
         layer: "line",
@@ -328,12 +333,15 @@ fn results_of_bridges_keep_their_names() {
         chunk: 512,
     };
     let counters = Counters::default();
+    let next = Command::gauntlet("bridge calibrate").option("--bridge", "/dev/ttyACM0");
+    let warnings = [Warning::new("the glove is not calibrated", next)];
     let bridge = devices::Bridge {
         hello: Some(&hello),
         status: &status,
         slots: &slots,
         counters: &counters,
         health: Some(&health),
+        warnings: &warnings,
     };
     golden(
         "bridge.json",

@@ -7,9 +7,9 @@
 //! | Modbus TCP headers without bodies, foreign and late frames | `doctor_lines`: `headers_without_bodies_foreign_frames_and_late_answers_are_told_apart` |
 //! | a server without transaction numbers, or with one client | `doctor_lines`: `a_server_without_…`, `a_server_of_one_client_…` |
 //! | glove and gripper exchanged | `gripper_doctor`: `swapped_ports_are_told`; `doctor_lines`: `teleop_and_doctor_say_the_same_…` |
-//! | an adapter that is pulled out | `ends`: `a_run_that_ends_without_its_glove_has_failed`; `devices`: `a_hold_that_the_gripper_does_not_confirm_…` |
+//! | an adapter that is pulled out | `ends_judged`: `a_run_that_ends_without_its_glove_has_failed`; `devices`: `a_hold_that_the_gripper_does_not_confirm_…` |
 //! | a process that stands still in a move | `gripper_doubted`: `a_process_that_stood_still_asks_where_the_gripper_is_before_it_commands` |
-//! | a disk that is full under the log | `ends`: `a_log_that_can_grow_no_more_is_told_while_the_run_goes_on_and_stays_readable` |
+//! | a disk that is full under the log | `ends_judged`: `a_log_that_can_grow_no_more_is_told_while_the_run_goes_on_and_stays_readable` |
 //! | models that are none, are cut short or have a flipped bit; tables as other programs write them; outputs that cannot be written | `wrong_files`, `domains`, `domains_refused`, `training`, `export` |
 #![allow(missing_docs, clippy::unwrap_used)]
 

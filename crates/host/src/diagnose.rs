@@ -10,6 +10,7 @@ mod gripper;
 mod network;
 mod place;
 mod raw;
+mod sampled;
 mod search;
 mod serial;
 

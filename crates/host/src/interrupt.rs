@@ -89,7 +89,7 @@ impl Interrupt {
         flag::register(SIGXFSZ, Arc::clone(&interrupt.flags.file_limit))?;
         let _ = INSTALLED.set(interrupt.clone());
         #[cfg(target_os = "linux")]
-        faults::install()?;
+        faults::install(&interrupt.flags.asked)?;
         Ok(interrupt)
     }
 

@@ -8,7 +8,8 @@
 use std::fmt;
 use std::path::Path;
 
-use serde::ser::{Serialize, SerializeStruct, Serializer};
+use serde::Serialize;
+use serde::ser::{SerializeStruct, Serializer};
 
 /// A command line: the program and its arguments, each as the program gets it.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -162,6 +163,36 @@ impl NextStep {
             Part::Command(command) => Some(command),
             Part::Words(_) | Part::Same(_) => None,
         })
+    }
+}
+
+/// What a person should know before it goes wrong, and what they can do.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Warning {
+    /// What it is, with its value.
+    pub what: String,
+    /// What helps; nothing to do where it may well be so.
+    #[serde(flatten)]
+    pub next: NextStep,
+}
+
+impl Warning {
+    /// `what`, and what helps.
+    pub fn new(what: impl Into<String>, next: impl Into<NextStep>) -> Self {
+        Self {
+            what: what.into(),
+            next: next.into(),
+        }
+    }
+}
+
+impl fmt::Display for Warning {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.what)?;
+        match self.next.is_empty() {
+            true => Ok(()),
+            false => write!(f, "; {}", self.next),
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use thread_priority::{ThreadPriority, ThreadPriorityValue};
 
 /// What helps where the bridge's own steps come late, as a next step.
 pub const LESS_TO_DO: &str = "a computer with less to do: close other programs, or allow this user real-time priority \
-                              (docs/tool.md, `rtprio`)";
+                              (docs/tool.md, rtprio)";
 
 /// Above every ordinary program, below the kernel's own threads (50).
 const PRIORITY: u8 = 10;
@@ -35,7 +35,7 @@ impl Scheduling {
         match self {
             Self::Realtime => "close other programs",
             Self::Shared => {
-                "close other programs, or allow this user real-time priority (docs/tool.md, `rtprio`)"
+                "close other programs, or allow this user real-time priority (docs/tool.md, rtprio)"
             }
         }
     }

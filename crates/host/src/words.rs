@@ -125,7 +125,7 @@ pub fn disk(error: &std::io::Error) -> String {
         Some(Errno::NOSPC) => "no space left on the disk".to_owned(),
         Some(Errno::DQUOT) => "no space left: your quota on that disk is used up".to_owned(),
         Some(Errno::FBIG) => {
-            "the file is as long as the system lets this program make one (`ulimit -f`)".to_owned()
+            "the file is as long as the system lets this program make one (ulimit -f)".to_owned()
         }
         Some(Errno::ROFS) => "its folder is on a disk that is read-only".to_owned(),
         Some(Errno::ACCESS | Errno::PERM) => "you may not write in its folder".to_owned(),

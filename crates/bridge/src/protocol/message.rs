@@ -236,6 +236,7 @@ pub struct Slots {
 
 /// What a slot holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SlotContents {
     /// Nothing was ever committed, or a write was begun.
     Empty,
@@ -258,6 +259,7 @@ pub enum SlotContents {
 
 /// How an image stores its weights.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum WeightsKind {
     /// As f32.
     Float32,

@@ -18,7 +18,7 @@ use hae::image::{self, JointOrder};
 use serde::{Deserialize, Serialize};
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "State")]
+#[serde(remote = "State", rename_all = "snake_case")]
 pub(super) enum WireState {
     Idle,
     Holding(#[serde(with = "WireHoldReason")] HoldReason),
@@ -29,7 +29,7 @@ pub(super) enum WireState {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "HoldReason")]
+#[serde(remote = "HoldReason", rename_all = "snake_case")]
 enum WireHoldReason {
     HeartbeatLost,
     Settling,
@@ -46,7 +46,7 @@ enum WireHoldReason {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "GripperFault")]
+#[serde(remote = "GripperFault", rename_all = "snake_case")]
 enum WireGripperFault {
     Reported(#[serde(with = "WireFault")] Fault),
     ActivationLost(#[serde(with = "WireActivation")] Activation),
@@ -55,7 +55,7 @@ enum WireGripperFault {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Activation")]
+#[serde(remote = "Activation", rename_all = "snake_case")]
 pub(super) enum WireActivation {
     Reset,
     Activating,
@@ -64,7 +64,7 @@ pub(super) enum WireActivation {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Fault")]
+#[serde(remote = "Fault", rename_all = "snake_case")]
 pub(super) enum WireFault {
     None,
     ActivationNeeded,
@@ -85,7 +85,7 @@ pub(super) enum WireFault {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Position")]
+#[serde(remote = "Position", rename_all = "snake_case")]
 pub(super) enum WirePosition {
     Open,
     Closed,
@@ -111,7 +111,7 @@ pub(super) struct WireCalibrationState {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Try")]
+#[serde(remote = "Try", rename_all = "snake_case")]
 enum WireTry {
     None,
     Waiting,
@@ -121,7 +121,7 @@ enum WireTry {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "calibration::Refusal")]
+#[serde(remote = "calibration::Refusal", rename_all = "snake_case")]
 enum WireNotCalibrated {
     Engaged,
     NoFrames,
@@ -312,7 +312,7 @@ enum WireJointOrder {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "Contact")]
+#[serde(remote = "Contact", rename_all = "snake_case")]
 pub(super) enum WireContact {
     Moving,
     ContactOpening,
@@ -321,7 +321,7 @@ pub(super) enum WireContact {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "scan::Health")]
+#[serde(remote = "scan::Health", rename_all = "snake_case")]
 pub(super) enum WireSensorHealth {
     Good,
     Starting,
@@ -330,7 +330,7 @@ pub(super) enum WireSensorHealth {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "imu::Fault")]
+#[serde(remote = "imu::Fault", rename_all = "snake_case")]
 enum WireSampleFault {
     Zero,
     NotUnit,
@@ -343,7 +343,7 @@ enum WireSampleFault {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "imu::Error")]
+#[serde(remote = "imu::Error", rename_all = "snake_case")]
 enum WireSensorError {
     Mux(#[serde(with = "WireBusError")] bus::Error),
     Bus {
@@ -370,7 +370,7 @@ enum WireSensorError {
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(remote = "bus::Error")]
+#[serde(remote = "bus::Error", rename_all = "snake_case")]
 enum WireBusError {
     NackAddress,
     NackData,

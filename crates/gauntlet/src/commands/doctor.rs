@@ -14,7 +14,7 @@ use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::lines::list;
-use host::next::Command;
+use host::next::{Command, advice};
 
 /// Options of `doctor`.
 #[derive(Debug, Args)]
@@ -127,7 +127,7 @@ fn show(device: &str, place: &str, findings: &Findings) {
 fn only_ports(as_json: bool) -> Result<()> {
     let ports = list::list().or_fail(
         || "the serial ports cannot be listed".to_owned(),
-        "`ls /dev/tty*`",
+        Command::program("sh").option("-c", "ls /dev/tty*"),
     )?;
     if as_json {
         let doctor = devices::Doctor {
@@ -147,15 +147,14 @@ fn only_ports(as_json: bool) -> Result<()> {
     if ports.is_empty() {
         return Err(Failure::new(
             "no serial port found",
-            "plugging the adapter in, and `dmesg` for what the system says about it",
+            advice("plugging the adapter in, and ")
+                .then(Command::program("dmesg"))
+                .then(" for what the system says about it"),
         )
         .into());
     }
     if !as_json {
-        let doctor = Command::gauntlet("doctor")
-            .option("--gripper", "PORT")
-            .option("--glove", "PORT");
-        say!("name a device for more: {doctor}");
+        say!("for more, the same with --gripper or --glove and one of these ports");
     }
     Ok(())
 }

@@ -30,7 +30,7 @@ pub struct Ports {
 pub(crate) fn run(options: &Ports) -> Result<()> {
     let ports = list().or_fail(
         || "the serial ports cannot be listed".to_owned(),
-        "`ls /dev/tty*`",
+        Command::program("sh").option("-c", "ls /dev/tty*"),
     )?;
     if options.json {
         return results::print("ports", devices::Ports { ports: &ports });

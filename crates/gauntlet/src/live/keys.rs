@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::Key;
+use super::key::Key;
 
 /// After text, space and `c` are text for so long.
 const TEXT: Duration = Duration::from_secs(1);

@@ -2,7 +2,9 @@
 
 mod bars;
 mod draw;
+mod key;
 mod keys;
+mod parts;
 mod raw;
 mod small;
 mod view;
@@ -15,6 +17,7 @@ use ratatui::layout::Rect;
 use ratatui::{Terminal, TerminalOptions, Viewport};
 
 pub use draw::draw;
+pub use key::Key;
 pub use small::LEAST;
 pub use view::{Axis, Finger, View};
 
@@ -38,19 +41,6 @@ const REPEATS: Duration = Duration::from_millis(700);
 
 /// What the lines say that stand for a view.
 const LEGEND: &str = "           a line a second: the state, each axis asked→at (counts, 0 open to 255 closed), rates, what is wrong";
-
-/// What a person asked for with a key.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Key {
-    /// `q`, Escape or Ctrl-C: hold and end.
-    End,
-    /// Space: close or open the clutch.
-    Clutch,
-    /// Space where it may be text, or several at once: open the clutch if it is closed, never close it.
-    Open,
-    /// `c`: the hand is flat now, calibrate on it.
-    Calibrate,
-}
 
 /// Where the view goes.
 #[derive(Debug)]

@@ -5,7 +5,7 @@ use ratatui::style::{Color, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
-use super::draw::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines};
+use super::parts::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines, wrapped};
 use super::view::{View, count, old};
 use host::stats::short_or_dash;
 
@@ -126,31 +126,4 @@ fn hand_line(view: &View) -> Line<'static> {
         spans.push(Span::styled(format!("{name}{flex:>3.0}° "), style));
     }
     Line::from(spans)
-}
-
-/// `text` in lines of at most `width` columns, broken between words; a longer word is broken where it must be.
-pub(super) fn wrapped(text: &str, width: u16) -> Vec<String> {
-    let width = usize::from(width).max(1);
-    let mut lines: Vec<String> = Vec::new();
-    let mut line = String::new();
-    let mut length = 0;
-    for word in text.split_inclusive(' ') {
-        let letters = word.trim_end().chars().count();
-        if length > 0 && length + letters > width {
-            lines.push(std::mem::take(&mut line).trim_end().to_owned());
-            length = 0;
-        }
-        for letter in word.chars() {
-            if length == width && letter != ' ' {
-                lines.push(std::mem::take(&mut line));
-                length = 0;
-            }
-            if length < width {
-                line.push(letter);
-                length += 1;
-            }
-        }
-    }
-    lines.push(line.trim_end().to_owned());
-    lines
 }

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use host::diagnose::Findings;
 use host::lines::list::Listed;
-use host::next::NextStep;
+use host::next::{NextStep, Warning};
 
 /// `ports`.
 #[derive(Debug, Serialize)]
@@ -111,6 +111,8 @@ pub struct Bridge<'a> {
     pub counters: &'a Counters,
     /// Calibration, restart, stalls; a bridge of version 2 has none.
     pub health: Option<&'a Health>,
+    /// What was left half done, or is still to do.
+    pub warnings: &'a [Warning],
 }
 
 /// `bridge release`.

@@ -6,7 +6,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use host::chip::link::Flashed;
-use host::next::NextStep;
+use host::next::{NextStep, Warning};
 use host::training::model::Int16;
 use host::training::quality::{Measured, Quality};
 
@@ -34,7 +34,7 @@ pub struct Trained<'a> {
     /// How long the training took, s.
     pub training_s: f64,
     /// What a person should know.
-    pub warnings: &'a [String],
+    pub warnings: &'a [Warning],
     /// How good the map is.
     pub quality: Measures<'a>,
     /// Whether a hand's map is worth driving with; `null` for other domains.

@@ -14,8 +14,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use anyhow::Result;
 use serde::Serialize;
 
-use crate::out;
-use host::failure::Told;
+use crate::{options, out};
+use host::failure::{self, Told};
 
 /// What the names in a result mean. A name that changes, or goes, makes it one more; a new one does not.
 pub const VERSION: u32 = 1;
@@ -51,6 +51,13 @@ pub fn named<T>(verb: &'static str, value: T) -> Named<T> {
 pub fn print(verb: &'static str, value: impl Serialize) -> Result<()> {
     PRINTED.store(true, Ordering::Relaxed);
     out::json(&named(verb, value))
+}
+
+/// The judgement over a run, and as data why it failed: as whoever typed this command is told it.
+pub fn judged<T>(judgement: Result<T>) -> (Result<T>, Option<Told>) {
+    let judgement = judgement.map_err(|error| failure::typed(error, &options::typed()));
+    let told = judgement.as_ref().err().map(Told::of);
+    (judgement, told)
 }
 
 /// A result of `verb` in one line: one of many. Empty for a value that has no JSON form; none of this tool's.

@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::Serialize;
 
 use host::chip::link::Flashed;
+use host::failure::Told;
 use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::training::quality::Quality;
@@ -20,6 +21,8 @@ pub struct Run<'a> {
     pub log: Option<&'a Written>,
     /// The poses file of `bridge log`.
     pub poses: Option<Poses<'a>>,
+    /// Why it failed; `null` where it did not.
+    pub failure: Option<Told>,
 }
 
 /// A poses file that was written.

@@ -4,7 +4,7 @@ use anyhow::Result;
 
 use crate::results::runs;
 use crate::tell::Tell;
-use host::failure::{Failure, with_others};
+use host::failure::{Failure, Told, with_others};
 use host::recording::Written;
 use host::session::{Devices, Ending, Stopped, Summary};
 
@@ -32,13 +32,14 @@ impl Finished {
         stopped.judge(&self.devices).ok()
     }
 
-    /// All of it as data.
-    pub fn result(&self) -> runs::Run<'_> {
+    /// All of it as data, with what the judgement was.
+    pub fn result(&self, failure: Option<Told>) -> runs::Run<'_> {
         runs::Run {
             gripper: self.stopped.as_ref().ok().copied(),
             run: &self.summary,
             log: self.log.as_ref(),
             poses: None,
+            failure,
         }
     }
 
@@ -63,12 +64,20 @@ impl Finished {
     ///
     /// # Errors
     /// As [`Finished::judge_prepared`].
-    pub fn judge<T>(self, driven: Result<T>) -> Result<T> {
+    pub fn judge<T>(&mut self, driven: Result<T>) -> Result<T> {
+        self.judge_with(driven, Ok(()))
+    }
+
+    /// The same where besides a file of whoever drove was written.
+    ///
+    /// # Errors
+    /// As [`Finished::judge_prepared`].
+    pub fn judge_with<T>(&mut self, driven: Result<T>, written: Result<()>) -> Result<T> {
         let driven = match self.ending {
             Some(_) => driven,
             None => driven.and_then(|_| Err(self.interrupted().into())),
         };
-        self.judge_prepared(driven)
+        self.judge_all(driven, written)
     }
 
     /// Ended before driving began: what was done and what was not.
@@ -93,14 +102,22 @@ impl Finished {
     ///
     /// # Errors
     /// The first of the failures; the others are told after it.
-    pub fn judge_prepared<T>(self, driven: Result<T>) -> Result<T> {
-        let stopped = self
-            .stopped
-            .and_then(|stopped| stopped.judge(&self.devices).map(drop));
+    pub fn judge_prepared<T>(&mut self, driven: Result<T>) -> Result<T> {
+        self.judge_all(driven, Ok(()))
+    }
+
+    fn judge_all<T>(&mut self, driven: Result<T>, written: Result<()>) -> Result<T> {
+        let stopped = match &self.stopped {
+            Ok(stopped) => stopped.judge(&self.devices).map(drop),
+            // The failure is told in the judgement; that there is one stays.
+            Err(_) => {
+                std::mem::replace(&mut self.stopped, Err(anyhow::anyhow!("it failed"))).map(drop)
+            }
+        };
         let judge = |ending: Ending| ending.judge(&self.devices);
-        let ending = self.ending.map_or(Ok(()), judge);
+        let ending = self.ending.clone().map_or(Ok(()), judge);
         let log = self.log.as_ref().map_or(Ok(()), Written::judge);
-        first_failure(stopped, driven, [ending, log])
+        first_failure(stopped, driven, [ending, log, written])
     }
 }
 
@@ -170,7 +187,7 @@ mod tests {
         }
     }
 
-    fn told(finished: Finished, driven: Result<()>) -> String {
+    fn told(mut finished: Finished, driven: Result<()>) -> String {
         finished.judge(driven).unwrap_err().to_string()
     }
 
@@ -190,7 +207,7 @@ mod tests {
         assert!(told(held, Ok(())).contains("gripper no longer answers"));
         let held = finished(Ok(Stopped::Held), Some(well()), Some("disk full"));
         assert!(told(held, Ok(())).contains("incomplete: disk full"));
-        let well = finished(Ok(Stopped::Held), Some(well()), None);
+        let mut well = finished(Ok(Stopped::Held), Some(well()), None);
         assert!(well.judge(Ok(())).is_ok());
     }
 
@@ -227,6 +244,23 @@ mod tests {
     }
 
     #[test]
+    fn a_file_that_could_not_be_written_is_told_with_the_judgement_and_the_numbers_stay() {
+        let full = || Err(Failure::new("the log hand.csv: the disk is full", "room").into());
+        let mut alone = finished(Ok(Stopped::Held), Some(well()), None);
+        let error = alone.judge_with(Ok(()), full()).unwrap_err();
+        assert!(error.to_string().contains("hand.csv"), "{error}");
+        assert_eq!(alone.result(None).gripper, Some(Stopped::Held));
+        let lost = Ending {
+            glove_answers: false,
+            ..well()
+        };
+        let mut second = finished(Ok(Stopped::Held), Some(lost), None);
+        let told = Told::of(&second.judge_with(Ok(()), full()).unwrap_err());
+        assert!(told.error.contains("glove no longer sends"), "{told:?}");
+        assert!(told.also[0].contains("hand.csv"), "{told:?}");
+    }
+
+    #[test]
     fn a_run_that_was_ended_before_driving_began_says_what_was_written_and_has_failed() {
         for (activated, stopped, words) in [
             (false, Stopped::Untouched, "nothing was written"),
@@ -241,7 +275,7 @@ mod tests {
             let text = told(run, Ok(()));
             assert!(text.contains(words), "{text}");
         }
-        let prepared = finished(Ok(Stopped::Untouched), None, None);
+        let mut prepared = finished(Ok(Stopped::Untouched), None, None);
         assert!(prepared.judge_prepared(Ok(())).is_ok());
     }
 
@@ -256,7 +290,7 @@ mod tests {
                 held: Some(held),
                 ..well()
             };
-            let run = finished(Ok(Stopped::Held), Some(ending), None);
+            let mut run = finished(Ok(Stopped::Held), Some(ending), None);
             assert!(run.judge(Ok(())).is_ok(), "{held:?}");
         }
     }

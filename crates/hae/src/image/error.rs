@@ -153,7 +153,7 @@ impl fmt::Display for Error {
             Self::Magic { found } => {
                 write!(
                     f,
-                    "not a weights image: it starts with {found:02x?}: make one with `gauntlet export`"
+                    "not a weights image: it starts with {found:02x?}: make one with gauntlet export"
                 )
             }
             Self::Format { found } => {

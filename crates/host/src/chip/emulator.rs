@@ -17,6 +17,7 @@ use tempfile::TempDir;
 use crate::chip::link::{Address, HostLink};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
+use crate::next::{Command as Typed, advice};
 use crate::realtime;
 
 /// The program that emulates.
@@ -73,7 +74,7 @@ pub fn find_firmware(given: Option<&Path>) -> Result<PathBuf> {
     }
     Err(Failure::new(
         format!("the firmware {} is not there", path.display()),
-        "`cargo xtask firmware` in the checkout, or --firmware with the ELF file's path",
+        super::firmware().then(" in the checkout, or --firmware with the ELF file's path"),
     )
     .into())
 }
@@ -98,7 +99,10 @@ impl Emulator {
         if !qemu_is_there() {
             return Err(Failure::new(
                 format!("{QEMU} is not on the path"),
-                "`sudo apt-get install qemu-system-arm`",
+                Typed::program("sudo")
+                    .word("apt-get")
+                    .word("install")
+                    .word("qemu-system-arm"),
             )
             .into());
         }
@@ -155,7 +159,9 @@ impl Emulator {
             .and_then(|(child, _)| child)
             .or_fail(
                 || format!("{QEMU} does not start"),
-                "`qemu-system-arm --version`, which should print one",
+                Typed::program(QEMU)
+                    .word("--version")
+                    .then(", which should print one"),
             )?;
         self.child = Some(child);
         Ok(())
@@ -189,7 +195,9 @@ impl Emulator {
                 let words = std::fs::read_to_string(self.words_file()).unwrap_or_default();
                 return Err(Failure::new(
                     format!("{QEMU} ended ({status}): {words}"),
-                    "a QEMU of version 7.2 or later, and a firmware that `cargo xtask firmware` built",
+                    advice("a QEMU of version 7.2 or later, and a firmware that ")
+                        .then(super::firmware())
+                        .then(" built"),
                 )
                 .into());
             }

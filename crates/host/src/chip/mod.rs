@@ -2,3 +2,10 @@
 
 pub mod emulator;
 pub mod link;
+
+use crate::next::Command;
+
+/// What builds the firmware, in the checkout.
+fn firmware() -> Command {
+    Command::program("cargo").word("xtask").word("firmware")
+}

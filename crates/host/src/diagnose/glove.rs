@@ -1,5 +1,6 @@
 //! A glove's layers: port, serial bridge (SC18IM), I²C multiplexer (TCA9548A), 16 sensors.
 
+mod bridge_chip;
 mod bridge_line;
 mod sensors;
 
@@ -12,30 +13,17 @@ use glove::scan::Health;
 
 use super::Findings;
 use super::answer::Came;
-use super::search::{UNIT, persist};
+use super::search::persist;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::lines::UNIT;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
 use crate::next::{Command, advice};
+use bridge_chip::{
+    BAUDS, BUS_HUNG, DONE, MULTIPLEXERS, NO_ACKNOWLEDGE, READ_STATUS, RESET_BAUD, SET_TIMEOUT, WAIT,
+};
 use bridge_line::{UNKEPT_NEXT, ask, nobody, survey, unkept};
-
-/// The SC18IM's speed after power-on.
-const RESET_BAUD: u32 = 9_600;
-/// Speeds it may have been left at, likeliest first.
-const BAUDS: [u32; 4] = [BAUD, RESET_BAUD, 460_800, 230_400];
-/// Read the register I2CStat: `R 0A P`.
-const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
-/// Write the register I2CTO (09), 3 × 4.44 ms, on: else a bus that hangs keeps the bridge silent for ever.
-const SET_TIMEOUT: [u8; 4] = [0x57, 0x09, 0x07, 0x50];
-/// Addresses a TCA9548A can have; the first is the one every program here expects.
-const MULTIPLEXERS: std::ops::RangeInclusive<u8> = mux::ADDRESS..=mux::ADDRESS + 7;
-/// I2CStat: done, nobody acknowledged the address, the bus hung.
-const DONE: u8 = 0xF0;
-const NO_ACKNOWLEDGE: u8 = 0xF1;
-const BUS_HUNG: u8 = 0xF8;
-/// For its one byte: 4.2 ms at 9600 baud, an adapter's latency timer twice, a PC with other work.
-const WAIT: Duration = Duration::from_millis(80);
 
 /// Finds out which layer of the glove at `path` fails. Ends within half a minute, whatever comes.
 pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
@@ -122,8 +110,8 @@ fn find(
             return None;
         }
     }
-    if let Some((what, next)) = list::latency_fault(path) {
-        findings.wrong("port", what, next);
+    if let Some(slow) = list::latency_warning(path) {
+        findings.wrong("port", slow.what, slow.next);
     }
     let mut seen = Vec::new();
     for &baud in bauds {
@@ -181,12 +169,12 @@ fn bridge(baud: u32, status: u8, findings: &mut Findings) {
         RESET_BAUD => findings.note(
             "bridge",
             format!("{what}, as after power-on"),
-            "nothing: `teleop` switches it to 115200",
+            "nothing: teleop switches it to 115200",
         ),
         _ => findings.wrong(
             "bridge",
             format!("{what}: another program left it there"),
-            "unplug the glove and plug it in again: it then speaks 9600 baud, which `teleop` expects",
+            "unplug the glove and plug it in again: it then speaks 9600 baud, which teleop expects",
         ),
     }
     // The status is that of the last transfer, which may have been somebody else's.

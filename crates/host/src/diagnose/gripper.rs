@@ -1,19 +1,16 @@
 //! A gripper's layers: port, line (bytes, frames, baud), unit, and what the gripper says of itself.
 
 use std::path::Path;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
-use bridge::Platform;
-use embedded_io::{Read, ReadReady, Write};
 use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::registers::Kind;
-use gripper::{Activation, Event, Fault, Gripper, Status};
 
 use super::answer::Came;
-use super::cure::cure;
 use super::glove::glove_answers;
 use super::place::{Asked, Place, kind_of};
 use super::raw::{hex, text};
+use super::sampled::{SAMPLE, Sampled, interrupted, sample, says};
 use super::search::{Found, OTHER_BAUDS, Outcome, TRIES, search};
 use super::serial::{Tally, exchange, exchanges, words};
 use super::{Findings, network};
@@ -28,10 +25,6 @@ use crate::next::{Command, NextStep, advice};
 
 /// For an answer to a longer read, where answers are not late.
 const WAIT: Duration = Duration::from_millis(80);
-/// Reads to see how well the line does.
-const SAMPLE: Duration = Duration::from_secs(1);
-/// The longest wait between two looks.
-const LOOK: gripper::Duration = gripper::Duration::from_millis(1);
 
 /// Finds out which layer of the gripper at `path` (a serial port, or `tcp:HOST[:PORT]`) fails. Ends by itself, whatever
 /// comes: within half a minute on a serial line, within 15 s over TCP.
@@ -71,10 +64,6 @@ fn examine(place: Place<'_>, thorough: bool, interrupt: &Interrupt) -> Findings 
     findings
 }
 
-pub(super) fn interrupted(findings: &mut Findings) {
-    findings.note("search", "interrupted before it was done", "again");
-}
-
 fn serial(place: &Place<'_>, thorough: bool, findings: &mut Findings, interrupt: &Interrupt) {
     let (unit, baud) = (place.unit(), place.baud());
     let mut port = match Port::open(place.path, baud) {
@@ -82,8 +71,8 @@ fn serial(place: &Place<'_>, thorough: bool, findings: &mut Findings, interrupt:
         Err(error) => return findings.failure("port", &Failure::from(error)),
     };
     findings.good("port", format!("{} opens", place.path.display()));
-    if let Some((what, next)) = list::latency_fault(place.path) {
-        findings.note("port", what, next);
+    if let Some(slow) = list::latency_warning(place.path) {
+        findings.note("port", slow.what, slow.next);
     }
     let tally = exchanges(&mut port, unit, baud, interrupt);
     if tally.is_answered() {
@@ -324,59 +313,6 @@ fn talk(mut port: Port, place: &Place<'_>, findings: &mut Findings, interrupt: &
     }
 }
 
-/// What a second of reading came to.
-pub(super) struct Sampled<const X: usize> {
-    newest: Option<Status<X>>,
-    last_error: Option<gripper::Error>,
-    counters: gripper::link::Counters,
-    statuses: u32,
-    seconds: f64,
-}
-
-impl<const X: usize> Sampled<X> {
-    pub(super) fn newest(&self) -> Option<Status<X>> {
-        self.newest
-    }
-
-    /// Statuses a second.
-    pub(super) fn rate(&self) -> f64 {
-        f64::from(self.statuses) / self.seconds
-    }
-}
-
-/// Reads for a second.
-pub(super) fn sample<S, F, const X: usize>(
-    driver: &mut gripper::driver::Driver<S, F, X>,
-    pc: &mut Pc,
-    interrupt: &Interrupt,
-) -> Sampled<X>
-where
-    S: Read + ReadReady + Write,
-    F: gripper::driver::Family<X>,
-{
-    let start = Instant::now();
-    let (mut newest, mut last_error, mut statuses) = (None, None, 0);
-    while start.elapsed() < SAMPLE && !interrupt.asked() {
-        let now = pc.now();
-        match driver.poll(now) {
-            Some(Event::Status(status)) => {
-                newest = Some(status);
-                statuses += 1;
-            }
-            Some(Event::Failed(error)) => last_error = Some(error),
-            Some(Event::Sent) | None => {}
-        }
-        pc.wait_until(driver.next_due().clamp(now, now + LOOK));
-    }
-    Sampled {
-        newest,
-        last_error,
-        counters: driver.counters(),
-        statuses,
-        seconds: start.elapsed().as_secs_f64(),
-    }
-}
-
 fn told<const X: usize>(
     sampled: &Sampled<X>,
     kind: Kind,
@@ -414,35 +350,5 @@ fn told<const X: usize>(
         );
         let next = "cable, ground and termination; a PC with less other work";
         findings.by_share("line", lost as usize, asked as usize, what, next);
-    }
-}
-
-/// What the gripper says of itself.
-pub(super) fn says<const X: usize>(
-    status: &Status<X>,
-    kind: Kind,
-    place: &Place<'_>,
-    findings: &mut Findings,
-) {
-    let name = kind.name();
-    match status.fault {
-        Fault::None => findings.good("gripper", format!("{name}, no fault")),
-        fault => findings.wrong(
-            "gripper",
-            format!("{name}, fault {:02X}: {}", fault.code(), fault.sentence()),
-            cure(fault, |verb| place.command(verb)),
-        ),
-    }
-    let what = format!("it is {}", crate::words::activation(status.activation));
-    match status.activation {
-        Activation::Ready => findings.good("gripper", what),
-        Activation::Reset => findings.note(
-            "gripper",
-            what,
-            place.command("gripper activate").then(": the fingers move"),
-        ),
-        Activation::Activating | Activation::ChangingMode => {
-            findings.note("gripper", what, "waiting until it is done");
-        }
     }
 }

@@ -9,8 +9,8 @@ use std::time::Duration;
 use gripper::driver::ThreeFinger;
 use gripper::registers::Kind;
 
-use super::gripper::{sample, says};
 use super::raw::hex;
+use super::sampled::{interrupted, sample, says};
 use super::serial::enough;
 use super::{Findings, Place};
 use crate::clock::Clock;
@@ -62,7 +62,7 @@ pub(super) fn network(
         exchanges(&mut wire, place.unit(), &mut tally, interrupt);
     }
     if interrupt.asked() {
-        return super::gripper::interrupted(findings);
+        return interrupted(findings);
     }
     if tally.answers.is_empty() {
         return unanswered(address, wire, &tally, place, findings, interrupt);
@@ -208,7 +208,7 @@ impl Tally {
             patience.as_millis()
         );
         let next = place.with_patience(needed).command("gripper status");
-        let next = next.then(" (`teleop` takes --patience too); a network without the delay");
+        let next = next.then(" (teleop takes --patience too); a network without the delay");
         if *middle <= patience {
             findings.note("connection", what, next);
             return None;
@@ -254,7 +254,7 @@ fn unanswered(
                 return;
             }
             if interrupt.asked() {
-                return super::gripper::interrupted(findings);
+                return interrupted(findings);
             }
             let asked: Vec<String> = other_units(place).map(|unit| unit.to_string()).collect();
             let came = match instead {
@@ -355,7 +355,7 @@ fn busy(address: &tcp::Address, instead: &Came) -> NextStep {
 /// Whether the port passes the bytes of a serial line.
 fn serial_over_tcp(address: &tcp::Address, interrupt: &Interrupt) -> bool {
     Wire::connect(address, interrupt)
-        .is_ok_and(|mut wire| wire.answers_rtu(super::search::UNIT, WAIT_UNIT, interrupt))
+        .is_ok_and(|mut wire| wire.answers_rtu(crate::lines::UNIT, WAIT_UNIT, interrupt))
 }
 
 /// What the gripper says of itself, through the driver that everything else uses.
@@ -367,7 +367,7 @@ fn status(
 ) {
     // Time for a server of one client to see that the last one left.
     if interrupt.sleep(Duration::from_millis(100)) {
-        return super::gripper::interrupted(findings);
+        return interrupted(findings);
     }
     let faults = findings.faults();
     let line = match Line::open(place.path, place.asked.settings, interrupt) {

@@ -6,10 +6,9 @@ use std::time::Duration;
 use gripper::registers::Kind;
 use gripper::timing;
 
-use super::search::UNIT;
 use crate::lines::port::BAUD;
 use crate::lines::tcp;
-use crate::lines::{MOST_PATIENCE, Model, Settings};
+use crate::lines::{MOST_PATIENCE, Model, Settings, UNIT};
 use crate::next::Command;
 use crate::report::Reporter;
 

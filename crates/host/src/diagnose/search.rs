@@ -13,7 +13,6 @@ use super::Place;
 use super::answer::Came;
 use super::serial::exchange;
 use crate::interrupt::Interrupt;
-pub use crate::lines::UNIT;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
 use crate::report::{Nobody, Reporter};

@@ -252,7 +252,7 @@ impl Tally {
         );
         let next = place.with_patience(needed).command("gripper status");
         let next =
-            next.then(" (`teleop` takes --patience too); an adapter or a tunnel without the delay");
+            next.then(" (teleop takes --patience too); an adapter or a tunnel without the delay");
         if middle <= patience {
             findings.note("line", what, next);
             return None;

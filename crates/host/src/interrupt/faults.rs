@@ -8,10 +8,8 @@ use std::ffi::{c_int, c_void};
 use std::io;
 use std::mem::MaybeUninit;
 use std::ptr;
-use std::sync::OnceLock;
-use std::sync::atomic::Ordering;
-
-use super::INSTALLED;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 const FAULTS: [c_int; 4] = [libc::SIGILL, libc::SIGFPE, libc::SIGSEGV, libc::SIGBUS];
 
@@ -19,12 +17,17 @@ const FAULTS: [c_int; 4] = [libc::SIGILL, libc::SIGFPE, libc::SIGSEGV, libc::SIG
 /// stack that overflowed.
 static BEFORE: [OnceLock<libc::sigaction>; 4] = [const { OnceLock::new() }; 4];
 
-/// Catches all four from here on.
+/// What says that somebody asked for the end, for the handler.
+static ASKED: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+
+/// Catches all four from here on. `asked` becomes true where one was sent.
 ///
 /// # Errors
 /// The system's error where a handler cannot be installed.
 #[allow(unsafe_code)]
-pub(super) fn install() -> io::Result<()> {
+pub(super) fn install(asked: &Arc<AtomicBool>) -> io::Result<()> {
+    // The handler must find it.
+    let _ = ASKED.set(Arc::clone(asked));
     for (signal, before) in FAULTS.into_iter().zip(&BEFORE) {
         let mut old = MaybeUninit::<libc::sigaction>::uninit();
         // SAFETY: nothing is set; `old` has room for the answer.
@@ -54,8 +57,8 @@ fn done(result: c_int) -> io::Result<()> {
 extern "C" fn caught(signal: c_int, info: *mut libc::siginfo_t, _context: *mut c_void) {
     // SAFETY: with SA_SIGINFO the kernel hands over a siginfo that lives as long as the handler runs.
     let was_sent = unsafe { info.as_ref() }.is_some_and(|info| info.si_code <= 0);
-    if let Some(interrupt) = INSTALLED.get().filter(|_| was_sent) {
-        return interrupt.flags.asked.store(true, Ordering::SeqCst);
+    if let Some(asked) = ASKED.get().filter(|_| was_sent) {
+        return asked.store(true, Ordering::SeqCst);
     }
     let mut known = FAULTS.iter().zip(&BEFORE);
     if let Some(before) =

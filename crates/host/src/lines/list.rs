@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use serialport::SerialPortType;
 
+use crate::next::{Command, Warning};
+
 /// One serial port.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Listed {
@@ -27,7 +29,7 @@ pub struct Listed {
     /// How long the adapter keeps bytes back before it hands them to the PC, ms.
     pub latency_timer_ms: Option<u32>,
     /// What will go wrong with it, each with the command that helps.
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
 }
 
 /// Longest time an adapter may keep bytes back; the usual default of 16 ms makes a scan of the glove take 280 ms.
@@ -55,8 +57,8 @@ pub fn list() -> Result<Vec<Listed>, serialport::Error> {
 /// `root` is `/`, but for tests.
 fn describe(path: PathBuf, port_type: SerialPortType, root: &Path) -> Listed {
     let latency_timer_ms = latency_timer(&path, root);
-    let fault = latency_timer_ms.and_then(|ms| fault_of(&path, ms));
-    let warnings: Vec<String> = fault.map(warning).into_iter().collect();
+    let slow = latency_timer_ms.and_then(|ms| slow(&path, ms));
+    let warnings: Vec<Warning> = slow.into_iter().collect();
     let stable_path = stable_path(&path, root);
     let usb = match port_type {
         SerialPortType::UsbPort(usb) => Some(usb),
@@ -84,7 +86,7 @@ fn bare(
     path: PathBuf,
     kind: &'static str,
     latency_timer_ms: Option<u32>,
-    warnings: Vec<String>,
+    warnings: Vec<Warning>,
 ) -> Listed {
     Listed {
         path,
@@ -119,27 +121,24 @@ fn stable_path(path: &Path, root: &Path) -> Option<PathBuf> {
 }
 
 /// The warning about `path`'s latency timer, for commands that open a port.
-pub fn latency_warning(path: &Path) -> Option<String> {
-    latency_fault(path).map(warning)
-}
-
-/// The same as what is wrong, and the command that helps.
-pub fn latency_fault(path: &Path) -> Option<(String, String)> {
+pub fn latency_warning(path: &Path) -> Option<Warning> {
     let real = std::fs::canonicalize(path).ok()?;
-    fault_of(&real, latency_timer(&real, Path::new("/"))?)
-}
-
-fn warning((what, next): (String, String)) -> String {
-    format!("{what}: {next}")
+    slow(&real, latency_timer(&real, Path::new("/"))?)
 }
 
 /// What is wrong with a latency timer of `ms`, and the command that helps.
-fn fault_of(path: &Path, ms: u32) -> Option<(String, String)> {
+fn slow(path: &Path, ms: u32) -> Option<Warning> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     (ms > LATENCY_TIMER_MS).then(|| {
-        (
+        let file = format!("/sys/bus/usb-serial/devices/{name}/latency_timer");
+        // The one who may write it is root; a pipe is a shell's.
+        let writes = Command::program("sudo")
+            .word("sh")
+            .word("-c")
+            .word(format!("echo {LATENCY_TIMER_MS} > {file}"));
+        Warning::new(
             format!("its latency timer is {ms} ms, which slows the glove to a few scans a second"),
-            format!("`echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer`"),
+            writes,
         )
     })
 }
@@ -158,8 +157,11 @@ mod tests {
             let port = describe("/dev/ttyUSB0".into(), SerialPortType::Unknown, root.path());
             assert_eq!(!port.warnings.is_empty(), warned);
             if warned {
-                assert!(port.warnings[0].contains("16 ms"));
-                assert!(port.warnings[0].contains("devices/ttyUSB0/latency_timer"));
+                assert!(port.warnings[0].what.contains("16 ms"));
+                let commands: Vec<&Command> = port.warnings[0].next.commands().collect();
+                let words = commands[0].words();
+                let shell = "echo 1 > /sys/bus/usb-serial/devices/ttyUSB0/latency_timer";
+                assert_eq!(words, ["sudo", "sh", "-c", shell]);
             }
         }
     }

@@ -182,13 +182,36 @@ impl Ending {
                 devices.bridge("bridge status"),
                 ", which says what is written",
             ),
-            Mends::Weights => and("", devices.bridge("flash MODEL"), " with a trained model"),
-            Mends::Activation => {
-                NextStep::same(Command::more().word("--activate")).then(": the fingers will move")
-            }
-            Mends::Calibration => NextStep::same(Command::more().word("--calibrate-flat"))
-                .then(", and the hand flat and still until it says done"),
+            Mends::Weights => and(
+                "flashing a trained model into the bridge",
+                devices.bridge("bridge status"),
+                ", which says what its slots hold",
+            ),
+            Mends::Activation => again(
+                devices,
+                devices
+                    .bridge("bridge engage")
+                    .map(|engage| engage.word("--activate")),
+                Command::more().word("--activate"),
+                ": the fingers will move",
+            ),
+            Mends::Calibration => again(
+                devices,
+                devices.bridge("bridge calibrate"),
+                Command::more().word("--calibrate-flat"),
+                ", and the hand flat and still until it says done",
+            ),
         }
+    }
+}
+
+/// A command for the bridge on a chip (whoever only watches it has not the option), the same with `more` here; and where the
+/// devices are gone with the run, the run once more, which begins with it.
+fn again(devices: &Devices, at_chip: Option<Command>, more: Command, why: &str) -> NextStep {
+    match (devices, at_chip) {
+        (Devices::Chip(_), Some(command)) => command.then(why),
+        (Devices::Here { .. }, _) => NextStep::same(more).then(why),
+        (Devices::Chip(_) | Devices::Unknown, _) => "the same again".into(),
     }
 }
 

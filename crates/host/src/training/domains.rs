@@ -12,7 +12,7 @@ use trainer::model::Normalisation;
 use trainer::operator::{GroundTruth, Operator};
 
 use super::pairs::{PairChoice, PairKind};
-use super::{Task, Units};
+use super::task::{Task, Units};
 use crate::failure::{Failure, told};
 use crate::report::Reporter;
 use crate::training::motion::tell_notes;

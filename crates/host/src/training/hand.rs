@@ -15,8 +15,9 @@ use trainer::operator::Operator;
 use trainer::spread::spread;
 
 use super::domains::first;
+use super::learn::learn;
 use super::pairs::{PairChoice, PairKind};
-use super::{Course, Ended, TRAINING_SHARE, Task, Units, learn};
+use super::task::{Course, Ended, TRAINING_SHARE, Task, Units};
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::report::Reporter;

@@ -8,11 +8,11 @@ use anyhow::Result;
 use trainer::algorithm::{InUnits, Trainer};
 use trainer::remedy::Remedy;
 
+use super::task::{Course, Ended, Learned, Task};
 use super::told::Told;
-use super::{Course, Ended, Learned, Task};
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
-use crate::next::{Command, NextStep};
+use crate::next::{Command, NextStep, Warning};
 use crate::report::Reporter;
 
 /// A state is kept so often.
@@ -78,10 +78,11 @@ pub fn learn(
             kept = Instant::now();
             if let Err(error) = trainer.save_checkpoint(path) {
                 // The training is worth more than its copy.
-                told_so_far.warn(format!(
+                let what = format!(
                     "{error} (epoch {}): the training goes on, and is tried to be kept again in a minute",
                     trainer.epoch()
-                ));
+                );
+                told_so_far.warn(Warning::new(what, error.remedy()));
             }
         }
         ControlFlow::Continue(())

@@ -68,7 +68,7 @@ pub fn weights(path: &Path, int16: Option<&Path>, reporter: &dyn Reporter) -> Re
                 path.display(),
                 bytes.len()
             ),
-            "a model that `train` made",
+            "a model that train made",
         )
         .into());
     }
@@ -83,7 +83,7 @@ pub fn weights(path: &Path, int16: Option<&Path>, reporter: &dyn Reporter) -> Re
         // The bridge checks it too; here it costs no minutes on the line.
         return Weights::of_image(bytes).or_fail(
             || format!("the file {}", path.display()),
-            "an image that `export` wrote, whole",
+            "an image that export wrote, whole",
         );
     }
     let model = hand(parsed(&bytes, path, reporter)?, path)?;
@@ -170,7 +170,7 @@ fn hand(model: Model, path: &Path) -> Result<Model> {
                 path.display(),
                 bridge::HIDDEN
             ),
-            "a model that `train` made",
+            "a model that train made",
         )
         .into());
     }

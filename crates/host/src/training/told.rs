@@ -1,22 +1,23 @@
 //! What a person hears of a training: progress, and warnings once each.
 
-use trainer::algorithm::{Progress as Step, Warning};
+use trainer::algorithm::{Progress as Step, Warning as OfTraining};
 
+use crate::next::Warning;
 use crate::report::Progress;
 
 /// What a person is told while it trains.
 pub(super) struct Told {
     pub progress: Box<dyn Progress>,
-    pub warnings: Vec<String>,
+    pub warnings: Vec<Warning>,
     /// Of the input's columns.
     pub names: &'static [&'static str],
 }
 
 impl Told {
     /// A warning of the training.
-    pub fn tell(&mut self, warning: &Warning, step: &Step<'_>) {
-        let text = self.words(warning, step);
-        self.warn(text);
+    pub fn tell(&mut self, warning: &OfTraining, step: &Step<'_>) {
+        let what = self.words(warning, step);
+        self.warn(Warning::new(what, warning.remedy()));
     }
 
     pub fn show(&mut self, step: &Step<'_>) {
@@ -35,20 +36,20 @@ impl Told {
     }
 
     /// A warning, once: a training that pauses looks at its end again.
-    pub fn warn(&mut self, text: String) {
-        if !self.warnings.contains(&text) {
-            self.progress.note(&format!("warning: {text}"));
-            self.warnings.push(text);
+    pub fn warn(&mut self, warning: Warning) {
+        if !self.warnings.contains(&warning) {
+            self.progress.note(&format!("warning: {warning}"));
+            self.warnings.push(warning);
         }
     }
 
     /// A warning of the map with its epoch, one of the data with the column's name.
-    fn words(&self, warning: &Warning, step: &Step<'_>) -> String {
+    fn words(&self, warning: &OfTraining, step: &Step<'_>) -> String {
         match warning {
-            Warning::Fold { .. } | Warning::Uncovered { .. } => {
+            OfTraining::Fold { .. } | OfTraining::Uncovered { .. } => {
                 format!("{warning} (epoch {} of {})", step.epoch, step.total)
             }
-            Warning::ConstantColumn {
+            OfTraining::ConstantColumn {
                 what: "input",
                 column,
                 value,

@@ -137,7 +137,7 @@ pub enum Warning {
     },
     /// Two parts of the inputs are mapped onto one another.
     #[error(
-        "the map seems to fold: neighbours in the image are {factor:.0} times farther apart in the input than they should be; another seed, adaptive pairs or one more pair usually unfolds it"
+        "the map seems to fold: neighbours in the image are {factor:.0} times farther apart in the input than they should be"
     )]
     Fold {
         /// [`crate::measures::fold_factor`] on the training samples.
@@ -145,7 +145,7 @@ pub enum Warning {
     },
     /// Much of the target has no image near.
     #[error(
-        "the map leaves part of the target uncovered: targets are {factor:.1} times as far from it as from evenly spread points; bring input samples of more varied poses, or train longer"
+        "the map leaves part of the target uncovered: targets are {factor:.1} times as far from it as from evenly spread points"
     )]
     Uncovered {
         /// [`crate::measures::gap_factor`] on the training samples.
@@ -169,6 +169,21 @@ pub enum Warning {
         /// The greatest sample.
         high: f32,
     },
+}
+
+impl Warning {
+    /// What helps; empty where it may well be so.
+    pub fn remedy(&self) -> &'static str {
+        match self {
+            Self::Fold { .. } => {
+                "another seed, adaptive pairs or one more pair, which usually unfolds it"
+            }
+            Self::Uncovered { .. } => "input samples of more varied poses, or a longer training",
+            Self::ConstantColumn { .. } | Self::DuplicateRows { .. } | Self::PairOutside { .. } => {
+                ""
+            }
+        }
+    }
 }
 
 /// Indices are kept in f32 lanes, exact below 2^24.

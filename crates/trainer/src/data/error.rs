@@ -233,10 +233,10 @@ impl Remedy for Error {
             Self::NotNumeric { .. } => "write it like 0.25, or remove this row".to_owned(),
             Self::NotFinite { .. } => "remove this row or fill the gap".to_owned(),
             Self::BeyondTurn { degrees: true, .. } => "repair or remove this row".to_owned(),
-            Self::BeyondTurn { .. } => "take full turns away where a sensor counted on, or say in the header that angles are in degrees (`index_mcp_flex [deg]`)".to_owned(),
+            Self::BeyondTurn { .. } => "take full turns away where a sensor counted on, or say in the header that angles are in degrees (index_mcp_flex [deg])".to_owned(),
             Self::Unit { .. } => "give radians ([rad]) or degrees ([deg])".to_owned(),
             Self::MixedUnits { .. } => "write one unit for all angles".to_owned(),
-            Self::TimeNotIncreasing { .. } => "a new clip there needs another word in a column `clip`, a wrong time its right value, and without any column of times the rows count in their order".to_owned(),
+            Self::TimeNotIncreasing { .. } => "a new clip there needs another word in a column clip, a wrong time its right value, and without any column of times the rows count in their order".to_owned(),
             Self::TooFewRows { .. } => "record more samples".to_owned(),
         }
     }

@@ -22,6 +22,7 @@ pub struct Health {
 
 /// Why a bridge started.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Restart {
     /// The board cannot tell.
     #[default]

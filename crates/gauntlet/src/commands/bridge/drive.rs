@@ -16,7 +16,7 @@ use crate::run::{Finished, Options, Run};
 use crate::tell::Tell;
 use host::chip::link::HostLink;
 use host::clock::Clock;
-use host::failure::Failure;
+use host::failure::{Failure, with_others};
 use host::interrupt::Interrupt;
 use host::session::{Devices, OnChip, refused};
 
@@ -38,14 +38,14 @@ pub(super) fn engage(
         true => drive(&mut run, "gauntlet bridge engage", seconds, true, at.json),
         false => Ok(()),
     });
-    let finished = run.finish();
+    let mut finished = run.finish();
     if !began {
         return finished.judge(driven);
     }
     if let Some(left) = finished.left() {
         tell.say(format_args!("the clutch is open: {left}"));
     }
-    finish("bridge engage", at, finished, None, driven)
+    finish("bridge engage", at, finished, (None, Ok(())), driven)
 }
 
 /// What comes before the clutch may close. Returns whether to go on.
@@ -124,7 +124,7 @@ pub(super) fn monitor(
 ) -> Result<()> {
     let mut run = start(at.connect()?, None, at.devices(), interrupt)?;
     let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
-    finish("bridge monitor", at, run.finish(), None, driven)
+    finish("bridge monitor", at, run.finish(), (None, Ok(())), driven)
 }
 
 pub(super) fn log(
@@ -141,8 +141,12 @@ pub(super) fn log(
         let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
         (run.finish(), driven)
     });
-    let rows = poses.finish()?;
-    let (finished, driven) = driven?;
+    let (rows, written) = poses.finish();
+    let (finished, driven) = match (driven, &written) {
+        (Ok(done), _) => done,
+        (Err(first), Err(other)) => return Err(with_others(first, vec![format!("{other:#}")])),
+        (Err(first), Ok(())) => return Err(first),
+    };
     match rows {
         0 => tell.say(format_args!(
             "log        none: no pose came, so that no file was left"
@@ -152,22 +156,24 @@ pub(super) fn log(
             path.display()
         )),
     }
-    let poses = runs::Poses { path, rows };
-    finish("bridge log", at, finished, Some(poses), driven)
+    // A file without a row is not there.
+    let poses = (rows > 0).then_some(runs::Poses { path, rows });
+    finish("bridge log", at, finished, (poses, written), driven)
 }
 
 /// The numbers, then the judgement over all of it.
 fn finish(
     verb: &'static str,
     at: &BridgeAt,
-    finished: Finished,
-    poses: Option<runs::Poses<'_>>,
+    mut finished: Finished,
+    (poses, written): (Option<runs::Poses<'_>>, Result<()>),
     driven: Result<()>,
 ) -> Result<()> {
+    let (judgement, failure) = results::judged(finished.judge_with(driven, written));
     if at.json {
         let result = runs::Run {
             poses,
-            ..finished.result()
+            ..finished.result(failure)
         };
         results::print(verb, result)?;
     } else {
@@ -177,5 +183,5 @@ fn finish(
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
     }
-    finished.judge(driven)
+    judgement
 }

@@ -50,20 +50,16 @@ impl Poses {
         Ok((poses, sender))
     }
 
-    /// Waits for the last row; the session has ended. Returns how many there are. A file without one is taken away: it would
-    /// stand in the way of the same command again.
-    ///
-    /// # Errors
-    /// A failure that names the file.
-    pub(super) fn finish(self) -> Result<u64> {
+    /// Waits for the last row; the session has ended. Returns how many there are, and a failure that names the file where one
+    /// could not be written. A file without one is taken away: it would stand in the way of the same command again.
+    pub(super) fn finish(self) -> (u64, Result<()>) {
         let stopped = || (0, Err(std::io::Error::other("its writer stopped")));
         let (rows, written) = self.writer.join().unwrap_or_else(|_| stopped());
         if rows == 0 {
             let _ = std::fs::remove_file(&self.path);
         }
         let name = || format!("the log {}", self.path.display());
-        written.or_fail(name, "room on the disk")?;
-        Ok(rows)
+        (rows, written.or_fail(name, "room on the disk"))
     }
 }
 
@@ -136,5 +132,17 @@ mod tests {
             .filter_map(|row| row.split(',').next())
             .collect();
         assert_eq!((rows, times), (2, vec!["0.040000", "0.160000"]));
+    }
+    #[test]
+    fn a_disk_that_takes_no_more_leaves_the_rows_it_took_and_names_the_file() {
+        let full = || Err(std::io::Error::from(std::io::ErrorKind::StorageFull));
+        let poses = Poses {
+            path: "/nowhere/hand.csv".into(),
+            writer: std::thread::spawn(move || (3, full())),
+        };
+        let (rows, written) = poses.finish();
+        let error = written.expect_err("the disk is full").to_string();
+        assert_eq!(rows, 3);
+        assert!(error.contains("/nowhere/hand.csv"), "{error}");
     }
 }

@@ -10,6 +10,8 @@ use crate::commands::flash::slot_lines;
 use crate::results::{self, devices};
 use crate::tell::Tell;
 use host::chip::link::Error;
+use host::next::{Warning, advice};
+use host::session::refused;
 use host::words;
 
 /// Shows all of it.
@@ -27,6 +29,7 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
         Err(Error::Older { .. }) => None,
         health => Some(at.told(health)?),
     };
+    let warnings = warnings(&status, health.as_ref(), at);
     if at.json {
         let bridge = devices::Bridge {
             hello: hello.as_ref(),
@@ -34,6 +37,7 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
             slots: &slots,
             counters: &counters,
             health: health.as_ref(),
+            warnings: &warnings,
         };
         return results::print("bridge status", bridge);
     }
@@ -50,13 +54,13 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
     tell.say(format_args!(
         "state      {}, clutch {}",
         status.state,
-        clutch_words(&status, at)
+        clutch_words(&status)
     ));
     for fault in standing_faults(&status) {
         tell.say(format_args!("fault      {fault}"));
     }
     if let Some(health) = &health {
-        health_lines(health, at)
+        health_lines(health)
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
     }
@@ -70,13 +74,6 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
     slot_lines(&slots)
         .iter()
         .for_each(|line| tell.say(format_args!("{line}")));
-    if let Some((there, announced)) = status.transfer {
-        tell.say(format_args!(
-            "transfer   {there} of {announced} bytes, not ended: `{}` goes on with it, `{}` gives it up",
-            at.command("flash MODEL"),
-            at.command("bridge reboot")
-        ));
-    }
     tell.say(format_args!(
         "counters   {} frames, {} to follow, {} of those answered; {} commands; {} gripper cycles, {} errors; bytes lost {:?} (host, glove, gripper)",
         counters.frames,
@@ -93,17 +90,46 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
             counters.stack_used
         ));
     }
+    for warning in &warnings {
+        tell.say(format_args!("warning    {warning}"));
+    }
     Ok(())
 }
 
-fn health_lines(health: &Health, at: &BridgeAt) -> Vec<String> {
+/// What was left half done, or is still to do, and the commands for it.
+fn warnings(status: &Status, health: Option<&Health>, at: &BridgeAt) -> Vec<Warning> {
+    let mut warnings = Vec::new();
+    if status.engaged && !status.heartbeat {
+        let releases = at.command("bridge release").then(", which ends the hold");
+        warnings.push(Warning::new(
+            "the clutch was left closed by a host that vanished",
+            releases,
+        ));
+    }
+    if let Some((there, announced)) = status.transfer {
+        let next = advice("flashing the same file again, which goes on; or ")
+            .then(at.command("bridge reboot"))
+            .then(", which gives it up");
+        let what =
+            format!("{there} of {announced} bytes of a weights image came, and it did not end");
+        warnings.push(Warning::new(what, next));
+    }
+    let calibration = health.map(|health| health.calibration);
+    if let Some(calibration) = calibration.filter(|calibration| !calibration.is_calibrated) {
+        let next = match calibration.newest {
+            Try::Refused(why) => refused(why, &at.devices()).next().clone(),
+            _ => at.command("bridge calibrate").into(),
+        };
+        warnings.push(Warning::new("the glove is not calibrated", next));
+    }
+    warnings
+}
+
+fn health_lines(health: &Health) -> Vec<String> {
     let calibration = match (health.calibration.is_calibrated, health.calibration.newest) {
         (true, _) => "calibrated".to_owned(),
         (false, Try::Refused(why)) => format!("not calibrated: {why}"),
-        (false, _) => format!(
-            "not calibrated: `{}` does it",
-            at.command("bridge calibrate")
-        ),
+        (false, _) => "not calibrated".to_owned(),
     };
     let restart = match health.restart {
         Restart::Unknown => "for a reason the board cannot tell",
@@ -118,14 +144,11 @@ fn health_lines(health: &Health, at: &BridgeAt) -> Vec<String> {
 }
 
 /// How the clutch is. A host that vanished leaves a hold, which keeps the bridge from other work until it is released.
-fn clutch_words(status: &Status, at: &BridgeAt) -> String {
+fn clutch_words(status: &Status) -> &'static str {
     match (status.engaged, status.heartbeat) {
-        (false, _) => "open".to_owned(),
-        (true, true) => "closed".to_owned(),
-        (true, false) => format!(
-            "left by a host that vanished: `{}` ends the hold",
-            at.command("bridge release")
-        ),
+        (false, _) => "open",
+        (true, true) => "closed",
+        (true, false) => "left by a host that vanished",
     }
 }
 

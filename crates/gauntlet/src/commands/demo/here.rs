@@ -6,8 +6,7 @@ use anyhow::Result;
 use glove::hand::Side;
 use rig::pty::Handle;
 
-use super::args::Demo;
-use super::parts::{self, Started};
+use super::parts::{self, Stage, Started};
 use crate::progress::Person;
 use crate::run::{LogTo, Run};
 use crate::tell::Tell;
@@ -25,18 +24,16 @@ use host::training::motion::Motion;
 ///
 /// # Errors
 /// A failure that says which of its steps did not succeed.
-pub(super) fn start(
-    options: &Demo,
-    motion: &Motion,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<Started> {
+pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
+    let Stage {
+        options,
+        motion,
+        tell,
+        interrupt,
+    } = stage;
     let clock = Clock::start();
-    tell.say(format_args!(
-        "gauntlet demo: glove and gripper are virtual, everything between them is real"
-    ));
-    tell.say(format_args!("motion     {}", motion.describe()));
-    let outcome = parts::trained(options, motion, tell, interrupt)?;
+    stage.introduce("everything between them is real");
+    let outcome = parts::trained(stage)?;
     let image = model::image(&outcome.model)?;
     let length = image.len();
     let model = options.gripper_model;

@@ -16,7 +16,7 @@ use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::stats::seconds;
 use host::training::motion::Motion;
-use parts::Started;
+use parts::{Stage, Started};
 
 pub use args::Demo;
 
@@ -39,7 +39,12 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         true => on_chip::start,
         false => here::start,
     };
-    let mut started = start(options, &motion, &tell, interrupt)?;
+    let mut started = start(Stage {
+        options,
+        motion: &motion,
+        tell: &tell,
+        interrupt,
+    })?;
     let driven = drive(options, &mut started, &tell);
     let Started {
         run,
@@ -48,8 +53,17 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         home,
         ..
     } = started;
-    let finished = run.finish();
+    let mut finished = run.finish();
     drop(home);
+    if !options.json || finished.ending.is_none() {
+        say(&finished, &outcome.quality.line(), &tell);
+    }
+    let moved = finished.summary.first_motion_s.is_some();
+    let judgement = finished.judge(driven).and_then(|end| match end {
+        End::Time if !moved => Err(not_moved(options)),
+        End::Time | End::Asked => Ok(()),
+    });
+    let (judgement, failure) = results::judged(judgement);
     if options.json && finished.ending.is_some() {
         let result = runs::Demo {
             motion: motion.describe(),
@@ -58,17 +72,11 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             pairs: outcome.pairs,
             quality: &outcome.quality,
             flash: flashed.as_ref(),
-            run: finished.result(),
+            run: finished.result(failure),
         };
         results::print("demo", result)?;
-    } else {
-        say(&finished, &outcome.quality.line(), &tell);
     }
-    let moved = finished.summary.first_motion_s.is_some();
-    match finished.judge(driven)? {
-        End::Time if !moved => Err(not_moved(options)),
-        End::Time | End::Asked => Ok(()),
-    }
+    judgement
 }
 
 /// Brings everything up, activates, engages, runs.
@@ -126,7 +134,7 @@ fn not_moved(options: &Demo) -> anyhow::Error {
         true => {
             "the same on a machine with less to do, without --json, whose lines say what held it"
         }
-        false => "--log FILE.mcap, whose events say what held it",
+        false => "the same with --log and a new file's name, whose events say what held it",
     };
     Failure::new("the gripper did not move with the hand", next).into()
 }

@@ -6,17 +6,15 @@ use anyhow::Result;
 use rig::pty::Handle;
 
 use super::args::Demo;
-use super::parts::{self, Started};
+use super::parts::{self, Stage, Started};
 use crate::commands::{bridge, flash};
 use crate::tell::Tell;
 use host::chip::emulator::{Emulator, Setup, find_firmware};
 use host::failure::Failure;
-use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::next::Command;
 use host::session::Devices;
 use host::training::model;
-use host::training::motion::Motion;
 
 /// Whether there can be such a demo.
 ///
@@ -41,18 +39,16 @@ pub(super) fn check(options: &Demo) -> Result<()> {
 ///
 /// # Errors
 /// A failure that says which of its steps did not succeed.
-pub(super) fn start(
-    options: &Demo,
-    motion: &Motion,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<Started> {
+pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
+    let Stage {
+        options,
+        motion,
+        tell,
+        interrupt,
+    } = stage;
     // What is missing is said before the training, not after it.
     let firmware = find_firmware(options.firmware.as_deref())?;
-    tell.say(format_args!(
-        "gauntlet demo: glove and gripper are virtual, the bridge is its ARM firmware in QEMU"
-    ));
-    tell.say(format_args!("motion     {}", motion.describe()));
+    stage.introduce("the bridge is its ARM firmware in QEMU");
     let devices = parts::virtual_devices(motion, options.gripper_model)?;
     let mut emulator = Emulator::new(Setup {
         firmware,
@@ -60,7 +56,7 @@ pub(super) fn start(
         gripper: Some(devices[1].path().to_owned()),
         debugger: false,
     })?;
-    let outcome = parts::trained(options, motion, tell, interrupt)?;
+    let outcome = parts::trained(stage)?;
     let image = model::image(&outcome.model)?;
     let mut link = emulator.link_unless(interrupt)?;
     tell_parts(&devices, &emulator, tell);

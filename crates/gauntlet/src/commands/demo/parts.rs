@@ -22,7 +22,7 @@ use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::lines::port::BAUD;
-use host::next::Command;
+use host::next::{Command, NextStep, advice};
 use host::realtime;
 use host::session::Snapshot;
 use host::stats::seconds;
@@ -32,6 +32,26 @@ use host::training::{Outcome, Request, train};
 
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
+
+/// What both homes of the bridge are started with.
+#[derive(Clone, Copy)]
+pub(super) struct Stage<'a> {
+    pub(super) options: &'a Demo,
+    pub(super) motion: &'a Motion,
+    pub(super) tell: &'a Tell,
+    pub(super) interrupt: &'a Interrupt,
+}
+
+impl Stage<'_> {
+    /// What is virtual and what is not, and what moves.
+    pub(super) fn introduce(&self, rest: &str) {
+        self.tell.say(format_args!(
+            "gauntlet demo: glove and gripper are virtual, {rest}"
+        ));
+        let motion = self.motion.describe();
+        self.tell.say(format_args!("motion     {motion}"));
+    }
+}
 
 /// A bridge that runs between virtual devices.
 pub(super) struct Started {
@@ -48,12 +68,13 @@ pub(super) struct Started {
     pub(super) frame_wait: Duration,
 }
 
-pub(super) fn trained(
-    options: &Demo,
-    motion: &Motion,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<Outcome> {
+pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
+    let Stage {
+        options,
+        motion,
+        tell,
+        interrupt,
+    } = stage;
     let request = Request {
         motion,
         space: Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
@@ -68,15 +89,16 @@ pub(super) fn trained(
         "training   {} and {PAIRS} chosen where they help most; a scripted operator shows the hand poses;",
         if options.no_start_pairs { "no start pairs" } else { "2 start pairs (open hand, fist)" }
     ));
-    let paper = match &options.poses {
-        Some(poses) => Command::gauntlet("train").path("--poses", poses),
-        None => Command::gauntlet("train").option("--poses", "FILE.csv"),
+    let paper: NextStep = match &options.poses {
+        Some(poses) => Command::gauntlet("train")
+            .path("--poses", poses)
+            .option("--schedule", "paper")
+            .option("--out", "model.safetensors")
+            .into(),
+        None => advice("train --schedule paper, with a recording of a hand"),
     };
-    let paper = paper
-        .option("--schedule", "paper")
-        .option("--out", "model.safetensors");
     tell.say(format_args!(
-        "           fast schedule, {} epochs (the paper's is 8,000 + 100 a pair: `{paper}`)",
+        "           fast schedule, {} epochs (the paper's is 8,000 + 100 a pair: {paper})",
         request.total_epochs()
     ));
     let outcome = train(&request, interrupt)?;
@@ -112,7 +134,9 @@ fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
         .and_then(|(handle, _)| handle)
         .or_fail(
             || format!("the virtual {name} gets no pseudo-terminal"),
-            "ending programs that hold many of them (`ls /dev/pts`)",
+            advice("ending programs that hold many of them (")
+                .then(Command::program("ls").word("/dev/pts"))
+                .then(")"),
         )
 }
 

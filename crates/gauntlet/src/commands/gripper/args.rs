@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::{Args, Subcommand, ValueEnum};
 use gripper::registers::three_finger;
 
-use crate::options::{model_parser, run_time};
+use crate::options::{LineOptions, model_parser, run_time};
 use host::lines::{Line, Model, Settings};
 use host::next::{Command, NextStep};
 
@@ -86,16 +86,9 @@ pub struct Target {
     /// its manual does not name. A command for another family moves the fingers elsewhere.
     #[arg(long)]
     pub trust_model: bool,
-    /// Its Modbus unit (slave id), if not 9 on a serial line (1 to 247) or 2 over TCP (0 to 255).
-    #[arg(long, value_name = "N")]
-    pub unit: Option<u8>,
-    /// Speed of the serial line, if not 115200; a network has none.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1_200..=1_000_000))]
-    pub baud: Option<u32>,
-    /// Wait so much longer for answers, milliseconds (1 to 1000): for a serial tunnel or a slow network. A move then
-    /// leads by smaller steps.
-    #[arg(long, value_name = "MS", value_parser = host::lines::patience)]
-    pub patience: Option<Duration>,
+    /// How its line differs from that of a gripper as delivered.
+    #[command(flatten)]
+    pub line: LineOptions,
     /// Show the status block's bytes too.
     #[arg(long)]
     pub raw: bool,
@@ -111,9 +104,7 @@ impl Target {
             gripper: place.to_owned(),
             model,
             trust_model: false,
-            unit: None,
-            baud: None,
-            patience: None,
+            line: LineOptions::default(),
             raw: false,
             json: false,
         }
@@ -130,11 +121,7 @@ impl Target {
 
     /// What differs from a gripper as delivered.
     pub fn settings(&self) -> Settings {
-        Settings {
-            unit: self.unit,
-            baud: self.baud,
-            patience: self.patience,
-        }
+        self.line.given()
     }
 
     /// `gauntlet gripper VERB` for the same gripper.

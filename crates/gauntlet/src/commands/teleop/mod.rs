@@ -96,7 +96,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         Ok(Prepared::Ended | Prepared::NoFrames) => Ok(()),
         Err(error) => Err(error),
     };
-    let finished = run.finish();
+    let mut finished = run.finish();
     let driven = match frames {
         true => driven,
         // The port is free now.
@@ -104,10 +104,12 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     };
     if !options.json {
         finished.tell(&tell, "");
-    } else if finished.ending.is_some() {
-        results::print("teleop", finished.result())?;
     }
-    finished.judge(driven)
+    let (judgement, failure) = results::judged(finished.judge(driven));
+    if options.json && finished.ending.is_some() {
+        results::print("teleop", finished.result(failure))?;
+    }
+    judgement
 }
 
 fn check_ports(options: &Teleop) -> Result<()> {

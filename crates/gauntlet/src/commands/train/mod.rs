@@ -18,7 +18,7 @@ use crate::tell::Tell;
 use crate::{note, reading};
 use host::failure::{Failure, told};
 use host::interrupt::Interrupt;
-use host::next::{Command, NextStep};
+use host::next::{Command, NextStep, Warning};
 use host::stats::seconds;
 use host::training::quality::{Measured, Quality};
 use host::training::{Course, Ended, Task};
@@ -89,33 +89,33 @@ fn unmeasured(options: &Train) -> anyhow::Error {
         "interrupted while the map was measured: the model is whole in {out}, without its measures"
     );
     let eval = Command::gauntlet("eval").path("--model", &options.out);
-    let next = match (&options.poses, &options.input, &options.target) {
-        (None, Some(input), Some(target)) => eval.path("--input", input).path("--target", target),
-        (poses, ..) => {
-            let poses = poses.as_deref().unwrap_or(Path::new("FILE.csv"));
-            eval.path("--poses", poses)
+    let next: NextStep = match (&options.poses, &options.input, &options.target) {
+        (None, Some(input), Some(target)) => {
+            eval.path("--input", input).path("--target", target).into()
         }
+        (Some(poses), ..) => eval.path("--poses", poses).into(),
+        (None, ..) => "measuring it with eval".into(),
     };
     Failure::new(what, next).into()
 }
 
 /// Why a hand's map is not worth driving with, and what helps.
-fn unfit(quality: &Quality) -> Option<String> {
-    let fault = quality.fault()?;
-    Some(format!(
-        "{fault}; train longer (--schedule, --epochs), with another --seed, or on a recording in which every finger moves over its \
-         whole range, alone and together"
-    ))
+fn unfit(quality: &Quality) -> Option<Warning> {
+    let next = "training longer (--schedule, --epochs), with another --seed, or on a recording in which every finger moves over its \
+                whole range, alone and together";
+    Some(Warning::new(quality.fault()?, next))
 }
 
 /// What true pairs say of a map that neighbours alone may not show to be folded: right maps have an NMSE below about .1, folded or
 /// turned ones about 1.
-fn far_from_truth(measured: &Measured) -> Option<String> {
+fn far_from_truth(measured: &Measured) -> Option<Warning> {
     const FAR: f64 = 0.5;
     let nmse = measured.nmse.filter(|nmse| *nmse > FAR)?;
-    Some(format!(
-        "the map folds or is turned: NMSE {nmse:.2} over true pairs (right maps: below 0.1); train with another --seed, \
-         one more of --pairs, or --schedule paper"
+    Some(Warning::new(
+        format!(
+            "the map folds or is turned: NMSE {nmse:.2} over true pairs (right maps: below 0.1)"
+        ),
+        "training with another --seed, one more of --pairs, or --schedule paper",
     ))
 }
 

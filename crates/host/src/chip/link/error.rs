@@ -159,9 +159,9 @@ impl Error {
             Self::Silent { heard, .. } if heard.unknown > 0 => {
                 "the tool and the firmware of the same release".into()
             }
-            Self::Older { .. } => {
-                "this release's firmware in the bridge: `cargo xtask firmware` builds it; weights can be flashed as it is".into()
-            }
+            Self::Older { .. } => advice("this release's firmware in the bridge: ")
+                .then(crate::chip::firmware())
+                .then(" builds it; weights can be flashed as it is"),
             Self::Silent { heard, .. } if heard.echoes > 0 => {
                 "the wiring: the line sends back what is sent to it, and no bridge answers; TX and RX bridged, or a program that echoes".into()
             }
@@ -183,13 +183,6 @@ impl Error {
             Self::Stopped { .. } => "the same command again: it goes on where it stopped, unless the bridge restarted".into(),
         };
         Failure::new(self.to_string(), next)
-    }
-}
-
-/// For who does not know where the bridge is: PORT stands for it in commands.
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        error.at(&Address::Serial("PORT".into()))
     }
 }
 
@@ -239,11 +232,10 @@ pub fn refusal_next(refusal: &Refusal, bridge: &Address) -> NextStep {
         Refusal::NoSession => "the same command again".into(),
         Refusal::Busy { .. } => "ending the other program, then 2 s of patience".into(),
         Refusal::Engaged | Refusal::Store(bridge::store::Error::Engaged) => advice(
-            "opening the clutch first: end the `bridge engage` that keeps it closed, or, where its host is gone, ",
+            "opening the clutch first: end the bridge engage that keeps it closed, or, where its host is gone, ",
         )
         .then(command("bridge release")),
-        Refusal::Store(bridge::store::Error::Busy) => command("flash MODEL")
-            .then(" with the same file, which goes on; or ")
+        Refusal::Store(bridge::store::Error::Busy) => advice("flashing the same file again, which goes on; or ")
             .then(command("bridge reboot"))
             .then(", which gives the image up"),
         Refusal::Store(error) => error.remedy().to_string().into(),

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use glove::timing;
 
-use super::{BAUDS, READ_STATUS, WAIT};
+use super::bridge_chip::{BAUDS, READ_STATUS, WAIT};
 use crate::diagnose::Findings;
 use crate::diagnose::raw::{self, Expect, Heard, hex, listen, text};
 use crate::interrupt::Interrupt;

@@ -7,7 +7,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu;
 use glove::scan::{Config, Health, Scanner, State};
 
-use super::RESET_BAUD;
+use super::bridge_chip::RESET_BAUD;
 use crate::clock::Clock;
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;

@@ -69,7 +69,10 @@ impl From<OpenError> for Failure {
                 .then(Command::gauntlet("simulate"))
                 .then(", say) again"),
             OpenError::Permission { group, .. } => {
-                format!("`sudo usermod -aG {group} $USER`, then log out and in again").into()
+                let joins = format!("sudo usermod -aG {group} \"$(id -un)\"");
+                Command::program("sh")
+                    .option("-c", joins)
+                    .then(", then log out and in again")
             }
             OpenError::Busy { path } => Command::program("fuser")
                 .path("-v", path)
@@ -77,9 +80,9 @@ impl From<OpenError> for Failure {
             OpenError::NotSerial { .. } => {
                 Command::gauntlet("ports").then(" to see the serial ports there are")
             }
-            OpenError::System { .. } => {
-                "another adapter or cable, and `dmesg` for what the system says".into()
-            }
+            OpenError::System { .. } => advice("another adapter or cable, and ")
+                .then(Command::program("dmesg"))
+                .then(" for what the system says"),
         };
         Self::new(error.to_string(), next)
     }

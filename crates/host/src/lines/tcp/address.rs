@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use super::PORT;
+use super::state::PORT;
 use crate::failure::Failure;
 
 /// A host and a port.

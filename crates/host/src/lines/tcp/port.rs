@@ -13,13 +13,13 @@ use gripper::registers::{COMMAND, STATUS};
 use gripper::rtu::{Registers, Request, Response, function};
 use tokio::sync::mpsc;
 
+use super::address::Address;
+use super::state::{BLOCK, CONNECT, EXCHANGE, Error, State, lock};
 use super::task::{self, Answers, Done, Job};
-use super::{Address, BLOCK, CONNECT, EXCHANGE, Error, State, lock};
-use crate::clock::Clock;
+use crate::clock::{Clock, ticks};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 use crate::lines::port::Watch;
-use crate::lines::ticks;
 
 /// Answers that may lie there; more than one only after the driver gave up waiting.
 const ANSWERS: usize = 4;

@@ -10,7 +10,7 @@ use std::task::{Context, Poll};
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::TcpStream;
 
-use super::{Error, lock};
+use super::state::{Error, lock};
 
 /// What came over a stream.
 #[derive(Debug, Default)]

@@ -16,7 +16,8 @@ use tokio_modbus::{Request, Response, Slave};
 use super::stream::{Seen, Watched};
 use crate::clock::Clock;
 
-use super::{Address, BLOCK, CONNECT, Error, RECONNECT_FIRST, RECONNECT_LAST, State, lock};
+use super::address::Address;
+use super::state::{BLOCK, CONNECT, Error, RECONNECT_FIRST, RECONNECT_LAST, State, lock};
 
 /// Registers of a block.
 const REGISTERS: u16 = (BLOCK / 2) as u16;
