@@ -15,6 +15,8 @@ const BITS_PER_CHARACTER: u64 = 10;
 const QUEUE: usize = 4096;
 /// Two UARTs understand each other when their rates differ by less than this many per mille.
 const BAUD_TOLERANCE: u64 = 30;
+/// Rate of a character during which its sender changed its own.
+const TORN: u32 = 0;
 /// Out of four garbled characters, about one comes back as noise.
 const NOISE_ONE_IN: u32 = 4;
 
@@ -43,6 +45,29 @@ pub struct Line<D> {
     passed: u64,
     /// The wire is cut when this many have passed.
     cut_at: Option<u64>,
+}
+
+impl Flying {
+    /// When its first bit began.
+    fn began(&self) -> u64 {
+        self.arrival.saturating_sub(character_ns(self.baud))
+    }
+}
+
+/// The sender of `queue` changes its rate at `now`: what has not begun goes out at the new one, the character under way is
+/// at no rate. Returns when the last bit leaves.
+fn retime(queue: &mut VecDeque<Flying>, baud: u32, now: u64) -> u64 {
+    let mut busy = now;
+    for flying in queue.iter_mut().filter(|f| f.arrival > now) {
+        if flying.began() < now {
+            flying.baud = TORN;
+        } else {
+            flying.arrival = busy + character_ns(baud);
+            flying.baud = baud;
+        }
+        busy = flying.arrival;
+    }
+    busy
 }
 
 /// Time of one character in ns at `baud`.
@@ -86,9 +111,21 @@ impl<D: Device> Line<D> {
         self.baud
     }
 
-    /// Sets the client's rate for bytes written from now on.
-    pub fn set_baud(&mut self, baud: u32) {
-        self.baud = baud.max(1);
+    /// Sets the client's rate at `now`, as a UART's: what was written and has not begun to leave goes out at the new rate, and
+    /// the character under way is torn, each way. Time must have been run up to `now`.
+    pub fn set_baud(&mut self, baud: u32, now: Instant) {
+        let baud = baud.max(1);
+        if baud == self.baud {
+            return;
+        }
+        self.baud = baud;
+        self.client_busy = retime(&mut self.to_device, baud, ns(now));
+        for flying in self.to_client.iter_mut().filter(|f| f.arrival > ns(now)) {
+            if flying.began() < ns(now) || !same_rate(flying.baud, baud) {
+                let [garbled, ..] = self.noise.next_u32().to_le_bytes();
+                flying.byte = garbled;
+            }
+        }
     }
 
     /// The device at the end.
@@ -205,7 +242,11 @@ impl<D: Device> Line<D> {
                 let Some(flying) = self.to_device.pop_front() else {
                     return;
                 };
+                let before = self.device.baud();
                 self.deliver(&flying);
+                if self.device.baud() != before {
+                    self.device_retuned(flying.arrival);
+                }
                 self.collect(instant(flying.arrival));
                 idle_due = None;
             } else if let Some(at) = due.filter(|d| *d <= now) {
@@ -228,12 +269,26 @@ impl<D: Device> Line<D> {
             self.device.receive(&[flying.byte], at);
             return;
         }
-        self.device.baud_seen(flying.baud);
+        if flying.baud != TORN {
+            self.device.baud_seen(flying.baud);
+        }
         let draw = self.noise.next_u32();
         let [garbled, noise, ..] = draw.to_le_bytes();
         self.device.receive(&[garbled], at);
         if (draw >> 16).is_multiple_of(NOISE_ONE_IN) {
             self.send_to_client(noise, at);
+        }
+    }
+
+    /// The device took another rate at `at`: what it has not sent goes out at that, and its character under way is torn.
+    fn device_retuned(&mut self, at: u64) {
+        let (rate, client) = (self.device.baud(), self.baud);
+        self.device_busy = retime(&mut self.to_client, rate, at);
+        for flying in self.to_client.iter_mut().filter(|f| f.arrival > at) {
+            if !same_rate(flying.baud, client) {
+                let [garbled, ..] = self.noise.next_u32().to_le_bytes();
+                flying.byte = garbled;
+            }
         }
     }
 
