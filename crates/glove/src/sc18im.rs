@@ -109,8 +109,8 @@ enum State {
         deadline: Instant,
         tries: u8,
     },
-    /// The chip was told another speed: that many tries so far, the new one is tried at `until`.
-    Switch { until: Instant, tries: u8 },
+    /// The chip was told another speed, which is tried at `until`.
+    Switch { to: u32, until: Instant, tries: u8 },
     /// The I²C clock was written; waiting for it to be read back.
     Setup { deadline: Instant, tries: u8 },
     /// Ready.
@@ -275,7 +275,7 @@ impl<S: SerialPort> Sc18im<S> {
                 deadline,
                 tries,
             } => self.poll_trial(settled, deadline, tries, now),
-            State::Switch { until, tries } => self.poll_switch(until, tries, now),
+            State::Switch { to, until, tries } => self.poll_switch(to, until, tries, now),
             State::Setup { deadline, tries } => self.poll_setup(deadline, tries, now),
             State::Idle => Ok(None),
             State::Exchange { expected, deadline } => self.poll_exchange(expected, deadline, now),
@@ -420,7 +420,11 @@ impl<S: SerialPort> Bus for Sc18im<S> {
             } => Some(if self.in_step() { settled } else { deadline }),
             State::Trial {
                 settled, deadline, ..
-            } => Some(if self.trial_passes() { settled } else { deadline }),
+            } => Some(if self.trial_passes() {
+                settled
+            } else {
+                deadline
+            }),
             State::Setup { deadline, .. } | State::Exchange { deadline, .. } => Some(deadline),
             State::Drain { quiet, .. } => Some(quiet),
             State::Diagnose {
@@ -448,3 +452,6 @@ impl<S: SerialPort> Bus for Sc18im<S> {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod speed_tests;

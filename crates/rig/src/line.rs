@@ -420,6 +420,25 @@ mod tests {
     }
 
     #[test]
+    fn what_waits_to_leave_when_the_client_changes_its_speed_leaves_at_the_new_one() {
+        let mut line = Echo::line(0, 115_200);
+        line.write(&[1, 2, 3, 4], at(0));
+        // In the middle of the second character.
+        line.run_until(at(130));
+        line.set_baud(9_600, at(130));
+        let mut out = [0; 16];
+        let count = line.read(&mut out, at(100_000));
+        // The first was right; its echo was under way. None of the others is what it was.
+        let right = out[..count].iter().filter(|b| (2..=5).contains(*b)).count();
+        assert_eq!(right, 0, "{:?}", &out[..count]);
+        // Back at the right speed nothing is left of it.
+        line.set_baud(115_200, at(100_000));
+        line.write(&[7], at(100_000));
+        assert_eq!(line.read(&mut out, at(101_000)), 1);
+        assert_eq!(out[0], 8);
+    }
+
+    #[test]
     fn a_cut_wire_lets_so_many_characters_pass_and_no_more() {
         for cut in 0..8 {
             let mut line = Echo::line(0, 115_200);

@@ -72,11 +72,7 @@ impl<S: SerialPort> Sc18im<S> {
         if self.in_step() && now >= settled {
             self.answered(tries, now)?;
         } else if now >= deadline {
-            let tries = match self.failed_here() {
-                true => 0,
-                false => tries.saturating_add(1),
-            };
-            self.go_down(now, tries);
+            self.go_down(now, tries.saturating_add(1));
         }
         Ok(None)
     }

@@ -11,9 +11,12 @@
 //! sent until the six bytes have left an adapter's buffer for certain ([`timing::REPLY_SLACK`]), and what came meanwhile is
 //! thrown away. Then [`TRIAL`] status bytes in a row at the new speed, in one exchange. The port is tried before the chip is told.
 //!
-//! **Lowering.** A raised speed at which the trial fails [`RAISE_TRIES`] times, or that loses too many replies
+//! **Lowering.** A speed at which the trial fails [`RAISE_TRIES`] times, or that loses too many replies
 //! ([`LOSSES_MAX`]), is ruled out until the chip's next restart. A chip that may sit at such a speed is told the
 //! lower one unheard. Never below the speed the port was opened with.
+//!
+//! What cannot be mended from here: a byte of the divisor itself spoiled on its way leaves the chip at a speed nobody looks
+//! for, until its power is cut. So a speed is left only after a trial at it, where one passes.
 
 use super::command::{self, Command};
 use super::{REPLY_MAX, Sc18im, SerialPort, State, baud_divisor, register};
@@ -60,7 +63,7 @@ pub const SPEEDS: [u32; 4] = [460_800, 230_400, 115_200, RESET_BAUD];
 /// Status bytes that must come in a row, all the same and nothing between them, before a speed is trusted.
 pub const TRIAL: usize = 8;
 
-/// How often the trial at a raised speed fails before that speed is ruled out.
+/// How often the trial at the speed a chip is being raised to fails before that is ruled out.
 pub const RAISE_TRIES: u8 = 2;
 
 /// A lost reply counts 32, a chip out of step 64, a reply takes one away: at this a raised speed is ruled out. One reply
@@ -69,10 +72,12 @@ pub const LOSSES_MAX: u16 = 256;
 const LOST: u16 = 32;
 const OUT_OF_STEP: u16 = 64;
 
+type Set<S> = fn(&mut S, u32) -> Result<(), BaudRefused>;
+
 /// What is known of the speeds.
 #[derive(Debug)]
 pub(super) struct Speeds<S> {
-    set: Option<fn(&mut S, u32) -> Result<(), BaudRefused>>,
+    set: Option<Set<S>>,
     /// Of the port now.
     line: u32,
     /// Of the port when it was handed over.
@@ -83,6 +88,8 @@ pub(super) struct Speeds<S> {
     /// What the chip was told last, and the newest at which it passed a trial.
     told: u32,
     heard: u32,
+    /// The chip answered just before it was told.
+    answered: bool,
     /// Place in the round of the search.
     turn: u8,
     /// Trials at the target that failed in a row.
@@ -101,6 +108,7 @@ impl<S> Speeds<S> {
             ceiling: limit,
             told: baud,
             heard: baud,
+            answered: false,
             turn: 0,
             failed: 0,
             losses: 0,
@@ -210,12 +218,13 @@ impl<S> Sc18im<S> {
         self.tune(before) && makes
     }
 
-    /// A try at the port's speed was in vain. Where that is the speed the chip is being raised to, it is ruled out the second
-    /// time; true then.
-    pub(super) fn failed_here(&mut self) -> bool {
+    /// The trial at the port's speed failed. If the chip is to run at that and somebody was there, it counts against the speed;
+    /// true when it is ruled out.
+    fn trial_failed(&mut self) -> bool {
         let speeds = &mut self.speeds;
-        let raising = speeds.line == speeds.target() && speeds.heard != speeds.line;
-        if speeds.set.is_none() || !raising || speeds.line != speeds.told {
+        let statuses = self.received.iter().filter(|b| command::is_status(**b));
+        let there = core::mem::take(&mut speeds.answered) || statuses.count() >= TRIAL / 2;
+        if speeds.line != speeds.target() || !there {
             return false;
         }
         speeds.failed = speeds.failed.saturating_add(1);
@@ -256,6 +265,7 @@ impl<S: SerialPort> Sc18im<S> {
             return self.begin_probe(tries, now);
         }
         let speed = self.speeds.next();
+        self.speeds.answered = false;
         // A port that cannot make it asks at the speed it has.
         self.tune(speed);
         if self.speeds.line > self.speeds.target() {
@@ -301,7 +311,7 @@ impl<S: SerialPort> Sc18im<S> {
         if self.trial_passes() && now >= settled {
             self.trust_speed(tries, now)?;
         } else if now >= deadline {
-            let tries = match self.failed_here() {
+            let tries = match self.trial_failed() {
                 true => 0,
                 false => tries.saturating_add(1),
             };
@@ -332,6 +342,7 @@ impl<S: SerialPort> Sc18im<S> {
                 break;
             }
             if self.port_makes(target) {
+                (self.speeds.told, self.speeds.turn, self.speeds.answered) = (target, 0, true);
                 return self.tell_speed(tries, now);
             }
             self.counters.speeds_refused = self.counters.speeds_refused.wrapping_add(1);
@@ -349,10 +360,10 @@ impl<S: SerialPort> Sc18im<S> {
         let command = speed_command(to)?;
         self.send(&command)?;
         self.counters.speed_changes = self.counters.speed_changes.wrapping_add(1);
-        (self.speeds.told, self.speeds.turn) = (to, 0);
         // The bytes must have left at the old speed, from an adapter's buffer, too.
         let wait = timing::serial(command.len(), self.speeds.line) + timing::REPLY_SLACK;
         self.state = State::Switch {
+            to,
             until: after(now, wait),
             tries,
         };
@@ -361,13 +372,14 @@ impl<S: SerialPort> Sc18im<S> {
 
     pub(super) fn poll_switch(
         &mut self,
+        to: u32,
         until: Instant,
         tries: u8,
         now: Instant,
     ) -> Result<Option<Reply>, Error> {
         self.pump(0)?;
         if now >= until {
-            self.tune(self.speeds.told);
+            self.tune(to);
             self.discard()?;
             self.begin_trial(tries, now)?;
         }
@@ -384,6 +396,7 @@ impl<S: SerialPort> Sc18im<S> {
         *losses = losses.saturating_add(LOST);
         let full = *losses >= LOSSES_MAX && !self.is_fixed_speed();
         if full && self.speeds.lower() && self.state == State::Idle {
+            (self.speeds.told, self.speeds.answered) = (self.speeds.target(), true);
             self.tell_speed(0, now)?;
         }
         Ok(())
