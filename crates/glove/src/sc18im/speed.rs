@@ -129,8 +129,8 @@ impl<S> Speeds<S> {
         if target <= self.floor {
             return false;
         }
-        self.ceiling = target - 1;
-        (self.turn, self.ceiling) = (0, self.target().max(self.floor));
+        self.ceiling = target.saturating_sub(1);
+        self.turn = 0;
         true
     }
 
