@@ -8,6 +8,7 @@
 use bridge::protocol::{Machine, Outcome, Server};
 use bridge::{App, Board, Config, WeightsStore, glove};
 use embedded_io::{Read, ReadReady, Write};
+use glove::scan::Scanner;
 
 /// Axes of the 3-Finger gripper.
 pub const AXES: usize = 4;
@@ -21,6 +22,13 @@ pub trait Chip: Board<AXES> {
 
     /// The gripper on its line: [`bridge::gripper::driver::ThreeFinger`] with the time this board's line wants.
     fn gripper(line: Self::Line) -> Self::Gripper;
+
+    /// The glove's scanner on its port: at 115,200 baud, for good. A board whose port can change its speed
+    /// ([`glove::sc18im::SetBaud`]) gives the scanner [`Scanner::with_set_baud`] and says how fast in
+    /// [`glove::scan::Config::raise_to`]; a glove whose power was cut is then found again.
+    fn scanner(port: Self::Glove) -> Scanner<Self::Glove> {
+        Scanner::new(port, glove::scan::Config::default())
+    }
 
     /// Starts the watchdog: from now on a second without [`Chip::feed_watchdog`] resets the machine.
     fn start_watchdog(&mut self);
@@ -69,7 +77,7 @@ fn bridge<C: Chip>(
     slots: [C::Flash; 2],
 ) -> App<C, AXES> {
     let store = WeightsStore::new(slots, bridge::app::expected(AXES));
-    let scanner = glove::scan::Scanner::new(glove, glove::scan::Config::default());
+    let scanner = C::scanner(glove);
     App::new(
         board,
         scanner,

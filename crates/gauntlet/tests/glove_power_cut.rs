@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use glove::scan::{Config, Scanner};
 use host::clock::Clock;
+use host::interrupt::Interrupt;
 use host::lines::port::{BAUD, Port};
 use rig::glove::VirtualGlove;
 use rig::pty::PtyDevice;
@@ -14,7 +15,7 @@ fn a_power_cycled_glove_comes_back_on_its_port_by_itself() {
     let glove = VirtualGlove::new(Box::new(still), rig::glove::Config::at_baud(BAUD));
     let device = PtyDevice::spawn(Box::new(glove.clone()), None).expect("a pseudo-terminal");
     let port = Port::open(device.path(), BAUD).expect("opens");
-    let mut scanner = Scanner::new(port, Config::default()).with_set_baud(Port::set_baud);
+    let mut scanner = Scanner::new(port, Config::default()).with_set_baud();
     let clock = Clock::start();
     let mut whole = |wanted: u16, limit: Duration| {
         let end = Instant::now() + limit;
@@ -36,4 +37,17 @@ fn a_power_cycled_glove_comes_back_on_its_port_by_itself() {
     assert!(whole(0xFFFF, Duration::from_secs(20)), "back");
     assert!(scanner.counters().starts.iter().all(|starts| *starts == 2));
     assert!(scanner.link_counters().restarts >= 1);
+}
+
+#[test]
+fn a_glove_left_at_another_speed_is_found_and_switched_to_the_usual_one() {
+    for baud in [9_600, 230_400, 460_800] {
+        let still = |_: f64| [0.0; 25];
+        let glove = VirtualGlove::new(Box::new(still), rig::glove::Config::at_baud(baud));
+        let device = PtyDevice::spawn(Box::new(glove.clone()), None).expect("a pseudo-terminal");
+        let found = host::probe::open_glove(device.path(), &Interrupt::never().expect("a pipe"))
+            .expect("found");
+        assert_eq!(found.switched, Some(baud));
+        assert_eq!(rig::Device::baud(&glove), BAUD);
+    }
 }

@@ -206,6 +206,11 @@ pub trait Bus {
     /// When [`Bus::poll`] has something to do even if no byte arrives.
     fn next_due(&self) -> Option<Instant>;
 
+    /// Speed of the serial line it hangs on, in baud; `None` where there is none.
+    fn line_baud(&self) -> Option<u32> {
+        None
+    }
+
     /// Whether a batch could be started, or is under way.
     fn is_up(&self) -> bool;
 

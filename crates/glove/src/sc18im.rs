@@ -16,15 +16,18 @@ use crate::bus::{Batch, Bus, Error, Reply};
 use crate::timing::{self, after};
 use command::Expected;
 use heapless::Vec;
+use speed::Speeds;
 
 mod blocking;
 mod command;
+mod config;
 mod recovery;
 mod speed;
 
 pub use blocking::Blocking;
 pub use command::{baud_divisor, register};
-pub use speed::SetBaud;
+pub use config::{Config, Counters};
+pub use speed::{BaudRefused, LOSSES_MAX, RAISE_TRIES, RESET_BAUD, SPEEDS, SetBaud, TRIAL};
 
 /// A serial port that does not block: `read_ready` before `read`, and writes that go to a queue.
 pub trait SerialPort: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write {}
@@ -39,47 +42,6 @@ const READ_MAX: usize = 128;
 /// Most bytes thrown away before a question: what a system's buffer holds. More means a line that babbles.
 const DISCARD_MAX: usize = 4_096;
 
-/// How the serial bridge is run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Config {
-    /// Baud of the port, which must be open at it: 9,600 for a chip fresh from reset, or what it was set to.
-    pub baud: u32,
-    /// Value of I2CClkL and I2CClkH ([`timing::I2C_DIVIDER`]); `None` leaves the chip's.
-    pub clock_divider: Option<u8>,
-}
-
-impl Default for Config {
-    fn default() -> Self {
-        Self {
-            baud: 115_200,
-            clock_divider: Some(timing::I2C_DIVIDER),
-        }
-    }
-}
-
-/// Counts since start; each wraps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counters {
-    /// Commands sent.
-    pub commands: u32,
-    /// I²C transactions that failed: not acknowledged, or timed out on the bus.
-    pub bus_errors: u32,
-    /// Replies that lost bytes although the bus did its work.
-    pub lost: u32,
-    /// Bytes that belonged to no reply: noise, or late.
-    pub stray: u32,
-    /// Replies thrown away because they were read after their deadline: the caller stood still.
-    pub stalled: u32,
-    /// Times the serial bridge lost step.
-    pub resyncs: u32,
-    /// Failures of the serial port.
-    pub port_errors: u32,
-    /// Times the chip was found at its reset speed, as after a power cut, and set to the port's again.
-    pub restarts: u32,
-    /// Times the chip did not keep the I²C clock it was given.
-    pub clock_refused: u32,
-}
-
 /// What the link is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
@@ -91,8 +53,14 @@ enum State {
         deadline: Instant,
         tries: u8,
     },
-    /// The chip was found at its reset speed and told another: that many tries so far, the new one is asked at `until`.
-    Switch { until: Instant, tries: u8 },
+    /// Asked for its status many times in a row, to know whether it really speaks at this speed.
+    Trial {
+        settled: Instant,
+        deadline: Instant,
+        tries: u8,
+    },
+    /// The chip was told another speed, which is tried at `until`.
+    Switch { to: u32, until: Instant, tries: u8 },
     /// The I²C clock was written; waiting for it to be read back.
     Setup { deadline: Instant, tries: u8 },
     /// Ready.
@@ -134,9 +102,7 @@ const DIAGNOSE_TRIES: u8 = 3;
 pub struct Sc18im<S> {
     serial: S,
     config: Config,
-    /// Speed of the port now, and how to change it.
-    line_baud: u32,
-    set_baud: Option<SetBaud<S>>,
+    speeds: Speeds<S>,
     state: State,
     received: Vec<u8, REPLY_MAX>,
     counters: Counters,
@@ -152,8 +118,7 @@ impl<S> Sc18im<S> {
         Self {
             serial,
             config,
-            line_baud: config.baud,
-            set_baud: None,
+            speeds: Speeds::new(config.baud, config.raise_to),
             state,
             received: Vec::new(),
             counters: Counters::default(),
@@ -255,7 +220,12 @@ impl<S: SerialPort> Sc18im<S> {
                 deadline,
                 tries,
             } => self.poll_probe(settled, deadline, tries, now),
-            State::Switch { until, tries } => self.poll_switch(until, tries, now),
+            State::Trial {
+                settled,
+                deadline,
+                tries,
+            } => self.poll_trial(settled, deadline, tries, now),
+            State::Switch { to, until, tries } => self.poll_switch(to, until, tries, now),
             State::Setup { deadline, tries } => self.poll_setup(deadline, tries, now),
             State::Idle => Ok(None),
             State::Exchange { expected, deadline } => self.poll_exchange(expected, deadline, now),
@@ -336,7 +306,7 @@ impl<S: SerialPort> Sc18im<S> {
 
 impl<S: SerialPort> Bus for Sc18im<S> {
     fn start(&mut self, batch: &Batch, now: Instant) -> Result<(), Error> {
-        let (command, expected) = command::batch(batch)?;
+        let (command, expected) = command::batch(batch, self.config.status_checks)?;
         self.require_idle()?;
         // What is there before the question is not its answer.
         match self.discard() {
@@ -352,7 +322,7 @@ impl<S: SerialPort> Bus for Sc18im<S> {
         }
         self.received.clear();
         self.send_or_fail(&command, now)?;
-        let wait = timing::reply(command.len(), expected.bytes, expected.i2c, self.line_baud);
+        let wait = timing::reply(command.len(), expected.bytes, expected.i2c, self.baud());
         self.state = State::Exchange {
             expected,
             deadline: after(now, wait),
@@ -365,16 +335,30 @@ impl<S: SerialPort> Bus for Sc18im<S> {
             self.state,
             State::Exchange { .. } | State::Drain { .. } | State::Diagnose { .. }
         );
-        match self.poll_state(now) {
-            Ok(reply) => reply.map(Ok),
-            Err(error) => {
-                if error == Error::Port {
-                    let tries = self.tries().map_or(0, |tries| tries.saturating_add(1));
-                    self.go_down(now, tries);
-                }
-                asked.then_some(Err(error))
+        let result = self.poll_state(now).and_then(|reply| {
+            if reply.is_some() {
+                self.account(false, now)?;
             }
+            Ok(reply)
+        });
+        let error = match result {
+            Ok(reply) => return reply.map(Ok),
+            Err(Error::Lost { expected, received }) => {
+                let lost = Error::Lost { expected, received };
+                self.account(true, now).err().unwrap_or(lost)
+            }
+            Err(error) => {
+                if error == Error::NoAnswer {
+                    self.note_out_of_step();
+                }
+                error
+            }
+        };
+        if error == Error::Port {
+            let tries = self.tries().map_or(0, |tries| tries.saturating_add(1));
+            self.go_down(now, tries);
         }
+        asked.then_some(Err(error))
     }
 
     fn next_due(&self) -> Option<Instant> {
@@ -384,6 +368,13 @@ impl<S: SerialPort> Bus for Sc18im<S> {
             State::Probe {
                 settled, deadline, ..
             } => Some(if self.in_step() { settled } else { deadline }),
+            State::Trial {
+                settled, deadline, ..
+            } => Some(if self.trial_passes() {
+                settled
+            } else {
+                deadline
+            }),
             State::Setup { deadline, .. } | State::Exchange { deadline, .. } => Some(deadline),
             State::Drain { quiet, .. } => Some(quiet),
             State::Diagnose {
@@ -391,6 +382,10 @@ impl<S: SerialPort> Bus for Sc18im<S> {
             } => Some(settled.map_or(deadline, |(_, until)| until)),
             State::Pause { until } | State::Switch { until, .. } => Some(until),
         }
+    }
+
+    fn line_baud(&self) -> Option<u32> {
+        Some(self.baud())
     }
 
     fn is_up(&self) -> bool {
@@ -407,3 +402,6 @@ impl<S: SerialPort> Bus for Sc18im<S> {
 
 #[cfg(test)]
 mod tests;
+
+#[cfg(test)]
+mod speed_tests;

@@ -145,6 +145,10 @@ pub const FINDINGS_MAX: usize = SEGMENT_COUNT;
 pub struct Config {
     /// Baud of the serial port; must be what the port is opened with.
     pub baud: u32,
+    /// Highest baud the serial bridge is raised to, as [`sc18im::Config::raise_to`].
+    pub raise_to: Option<u32>,
+    /// Whether every read is followed by its status, as [`sc18im::Config::status_checks`].
+    pub status_checks: bool,
     /// Value of the serial bridge's I²C clock registers; `None` leaves the chip's.
     pub clock_divider: Option<u8>,
     /// Address of the multiplexer, 0x70 to 0x77.
@@ -160,6 +164,8 @@ impl Default for Config {
         let serial = sc18im::Config::default();
         Self {
             baud: serial.baud,
+            raise_to: serial.raise_to,
+            status_checks: serial.status_checks,
             clock_divider: serial.clock_divider,
             mux: mux::ADDRESS,
             imu: imu::Config::default(),
@@ -195,17 +201,27 @@ impl<S: sc18im::SerialPort> Scanner<S> {
     pub fn new(serial: S, config: Config) -> Self {
         let serial_config = sc18im::Config {
             baud: config.baud,
+            raise_to: config.raise_to,
+            status_checks: config.status_checks,
             clock_divider: config.clock_divider,
         };
         Self::on(Sc18im::new(serial, serial_config), config)
     }
 
-    /// Gives the scanner a way to change the port's speed: a glove whose power was cut speaks 9,600 baud again, and is found and
-    /// set to the port's speed within seconds. Without one it stays silent.
+    /// Lets the scanner change the port's speed: a glove whose power was cut speaks 9,600 baud again, is found within seconds
+    /// and raised to [`Config::raise_to`]. Otherwise it stays silent.
     #[must_use]
-    pub fn with_set_baud(mut self, set_baud: sc18im::SetBaud<S>) -> Self {
-        self.bus = self.bus.with_set_baud(set_baud);
+    pub fn with_set_baud(mut self) -> Self
+    where
+        S: sc18im::SetBaud,
+    {
+        self.bus = self.bus.with_set_baud();
         self
+    }
+
+    /// Speed of the serial line now, in baud.
+    pub fn baud(&self) -> u32 {
+        self.bus.baud()
     }
 
     /// The port, for a caller that must wait on it.

@@ -34,6 +34,7 @@ struct Inner {
     script: RefCell<VecDeque<Exchange>>,
     arriving: RefCell<Vec<(u64, u8)>>,
     broken: Cell<bool>,
+    bauds: RefCell<Vec<u32>>,
 }
 
 impl Port {
@@ -90,9 +91,21 @@ impl Port {
         self.0.script.borrow().len()
     }
 
+    /// The speeds it was set to, in order.
+    pub fn bauds(&self) -> Vec<u32> {
+        self.0.bauds.borrow().clone()
+    }
+
     fn arrived(&self) -> bool {
         let now = self.0.now.get();
         self.0.arriving.borrow().iter().any(|(at, _)| *at <= now)
+    }
+}
+
+impl crate::sc18im::SetBaud for Port {
+    fn set_baud(&mut self, baud: u32) -> Result<(), crate::sc18im::BaudRefused> {
+        self.0.bauds.borrow_mut().push(baud);
+        Ok(())
     }
 }
 

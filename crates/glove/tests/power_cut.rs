@@ -5,18 +5,12 @@ mod common;
 use common::{ALL, Bench, assert_true, waving};
 use glove::Duration;
 use glove::scan::{Frame, Scanner, State};
-use rig::MemoryWire;
-
-fn set_baud(wire: &mut MemoryWire, baud: u32) -> bool {
-    wire.set_baud(baud);
-    true
-}
 
 /// A glove on a port whose speed can be changed.
 fn bench() -> Bench {
     let mut bench = Bench::new(waving);
     bench.scanner =
-        Scanner::new(bench.wire.clone(), glove::scan::Config::default()).with_set_baud(set_baud);
+        Scanner::new(bench.wire.clone(), glove::scan::Config::default()).with_set_baud();
     bench
 }
 
@@ -97,7 +91,7 @@ fn a_glove_fresh_from_power_on_is_found_at_9600_by_the_scanner_alone() {
         glove::scan::Config::default(),
     );
     bench.scanner =
-        Scanner::new(bench.wire.clone(), glove::scan::Config::default()).with_set_baud(set_baud);
+        Scanner::new(bench.wire.clone(), glove::scan::Config::default()).with_set_baud();
     let frames = bench.until(4_000_000);
     assert_eq!(frames.last().map(Frame::good), Some(ALL));
 }

@@ -19,6 +19,8 @@ use crate::report::Reporter;
 
 /// The SC18IM's speed after a reset.
 const RESET_BAUD: u32 = 9_600;
+/// The other speeds it may speak, likeliest first: after power-on, and where a faster session left it.
+const OTHER_BAUDS: [u32; 3] = [RESET_BAUD, 460_800, 230_400];
 /// Read the register I2CStat (0A): `R 0A P`. Answered by one byte, F0 to F8, whatever hangs on the bus.
 const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
 /// Write BRG0 = 30, BRG1 = 00: 7372800 / 115200 − 16 = 0x0030. Works as soon as BRG1 is there.
@@ -39,12 +41,12 @@ const LOOK: Duration = Duration::from_millis(1);
 pub struct Glove {
     /// Its port, at 115200 baud.
     pub port: Port,
-    /// Whether it spoke 9600 baud, as after power-on, and was switched.
-    pub switched: bool,
+    /// The speed it spoke where it was another, and was switched: 9600 baud, as after power-on, or what a program left it at.
+    pub switched: Option<u32>,
 }
 
-/// Opens the glove's port and finds its serial multiplexer, at 115200 baud or, fresh from power-on, at 9600, from where
-/// it is switched to 115200.
+/// Opens the glove's port and finds its serial multiplexer: at 115200 baud, or, fresh from power-on, at 9600, or where a faster
+/// session left it; from there it is switched to 115200.
 ///
 /// # Errors
 /// A failure that says whether the port does not open or nobody answers on it, and what to try.
@@ -54,33 +56,49 @@ pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
         diagnose::keeps_registers(path, &mut port, interrupt)?;
         return Ok(Glove {
             port,
-            switched: false,
+            switched: None,
         });
     }
     drop(port);
-    let mut slow = Port::open(path, RESET_BAUD).map_err(Failure::from)?;
-    if status_byte(&mut slow, interrupt) && slow.write(&SET_BAUD) == Ok(SET_BAUD.len()) {
-        // All six bytes must have left at the old speed: 6.3 ms.
-        interrupt.sleep(2 * SPEED_WAIT);
-        drop(slow);
-        let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
-        interrupt.sleep(SPEED_WAIT);
-        if answers(&mut port, interrupt) {
+    for baud in OTHER_BAUDS {
+        if let Some(mut port) = switched_from(baud, path, interrupt)? {
             diagnose::keeps_registers(path, &mut port, interrupt)?;
             return Ok(Glove {
                 port,
-                switched: true,
+                switched: Some(baud),
             });
         }
     }
     if interrupt.asked() {
         return Err(Failure::interrupted("while the glove was looked for").into());
     }
+    let [reset, high, low] = OTHER_BAUDS;
     let what = format!(
-        "no glove answers on {}, asked for its serial multiplexer (SC18IM) at {BAUD} and {RESET_BAUD} baud",
+        "no glove answers on {}, asked for its serial multiplexer (SC18IM) at {BAUD}, {reset}, {high} and {low} baud",
         path.display()
     );
     Err(diagnose::no_glove(&what, path, interrupt).into())
+}
+
+/// The glove's port at 115200 baud, if the multiplexer answers at `baud` and then there.
+fn switched_from(baud: u32, path: &Path, interrupt: &Interrupt) -> Result<Option<Port>> {
+    if baud != RESET_BAUD && interrupt.sleep(IDLE) {
+        // What was asked at the speeds before reached it as half a command.
+        return Ok(None);
+    }
+    let mut port = Port::open(path, baud).map_err(Failure::from)?;
+    // Noise may look like it once.
+    let there = status_byte(&mut port, interrupt)
+        && (baud == RESET_BAUD || status_byte(&mut port, interrupt));
+    if !there || port.write(&SET_BAUD) != Ok(SET_BAUD.len()) {
+        return Ok(None);
+    }
+    // All six bytes must have left at the old speed: 6.3 ms at 9600 baud.
+    interrupt.sleep(2 * SPEED_WAIT);
+    drop(port);
+    let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+    interrupt.sleep(SPEED_WAIT);
+    Ok(answers(&mut port, interrupt).then_some(port))
 }
 
 /// Twice at once, and once more after the time in which a cut-off command is forgotten.

@@ -15,6 +15,8 @@ const BITS_PER_CHARACTER: u64 = 10;
 const QUEUE: usize = 4096;
 /// Two UARTs understand each other when their rates differ by less than this many per mille.
 const BAUD_TOLERANCE: u64 = 30;
+/// Rate of a character during which its sender changed its own.
+const TORN: u32 = 0;
 /// Out of four garbled characters, about one comes back as noise.
 const NOISE_ONE_IN: u32 = 4;
 
@@ -43,6 +45,29 @@ pub struct Line<D> {
     passed: u64,
     /// The wire is cut when this many have passed.
     cut_at: Option<u64>,
+}
+
+impl Flying {
+    /// When its first bit began.
+    fn began(&self) -> u64 {
+        self.arrival.saturating_sub(character_ns(self.baud))
+    }
+}
+
+/// The sender of `queue` changes its rate at `now`: what has not begun goes out at the new one, the character under way is
+/// at no rate. Returns when the last bit leaves.
+fn retime(queue: &mut VecDeque<Flying>, baud: u32, now: u64) -> u64 {
+    let mut busy = now;
+    for flying in queue.iter_mut().filter(|f| f.arrival > now) {
+        if flying.began() < now {
+            flying.baud = TORN;
+        } else {
+            flying.arrival = busy + character_ns(baud);
+            flying.baud = baud;
+        }
+        busy = flying.arrival;
+    }
+    busy
 }
 
 /// Time of one character in ns at `baud`.
@@ -86,9 +111,21 @@ impl<D: Device> Line<D> {
         self.baud
     }
 
-    /// Sets the client's rate for bytes written from now on.
-    pub fn set_baud(&mut self, baud: u32) {
-        self.baud = baud.max(1);
+    /// Sets the client's rate at `now`, as a UART's: what was written and has not begun to leave goes out at the new rate, and
+    /// the character under way is torn, each way. Time must have been run up to `now`.
+    pub fn set_baud(&mut self, baud: u32, now: Instant) {
+        let baud = baud.max(1);
+        if baud == self.baud {
+            return;
+        }
+        self.baud = baud;
+        self.client_busy = retime(&mut self.to_device, baud, ns(now));
+        for flying in self.to_client.iter_mut().filter(|f| f.arrival > ns(now)) {
+            if flying.began() < ns(now) || !same_rate(flying.baud, baud) {
+                let [garbled, ..] = self.noise.next_u32().to_le_bytes();
+                flying.byte = garbled;
+            }
+        }
     }
 
     /// The device at the end.
@@ -205,7 +242,11 @@ impl<D: Device> Line<D> {
                 let Some(flying) = self.to_device.pop_front() else {
                     return;
                 };
+                let before = self.device.baud();
                 self.deliver(&flying);
+                if self.device.baud() != before {
+                    self.device_retuned(flying.arrival);
+                }
                 self.collect(instant(flying.arrival));
                 idle_due = None;
             } else if let Some(at) = due.filter(|d| *d <= now) {
@@ -228,12 +269,26 @@ impl<D: Device> Line<D> {
             self.device.receive(&[flying.byte], at);
             return;
         }
-        self.device.baud_seen(flying.baud);
+        if flying.baud != TORN {
+            self.device.baud_seen(flying.baud);
+        }
         let draw = self.noise.next_u32();
         let [garbled, noise, ..] = draw.to_le_bytes();
         self.device.receive(&[garbled], at);
         if (draw >> 16).is_multiple_of(NOISE_ONE_IN) {
             self.send_to_client(noise, at);
+        }
+    }
+
+    /// The device took another rate at `at`: what it has not sent goes out at that, and its character under way is torn.
+    fn device_retuned(&mut self, at: u64) {
+        let (rate, client) = (self.device.baud(), self.baud);
+        self.device_busy = retime(&mut self.to_client, rate, at);
+        for flying in self.to_client.iter_mut().filter(|f| f.arrival > at) {
+            if !same_rate(flying.baud, client) {
+                let [garbled, ..] = self.noise.next_u32().to_le_bytes();
+                flying.byte = garbled;
+            }
         }
     }
 
@@ -276,121 +331,4 @@ impl<D: Device> Line<D> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Duration;
-
-    /// Sends back each byte, one added, after a pause.
-    struct Echo {
-        pause: Duration,
-        waiting: VecDeque<(Instant, u8)>,
-    }
-
-    impl Echo {
-        fn line(pause_us: u64, baud: u32) -> Line<Echo> {
-            let pause = Duration::from_micros(pause_us);
-            Line::new(
-                Echo {
-                    pause,
-                    waiting: VecDeque::new(),
-                },
-                baud,
-            )
-        }
-    }
-
-    impl Device for Echo {
-        fn receive(&mut self, bytes: &[u8], now: Instant) {
-            self.waiting
-                .extend(bytes.iter().map(|b| (now + self.pause, b.wrapping_add(1))));
-        }
-        fn transmit(&mut self, now: Instant, out: &mut [u8]) -> usize {
-            let due = self
-                .waiting
-                .iter()
-                .take_while(|(t, _)| *t <= now)
-                .count()
-                .min(out.len());
-            for (slot, (_, byte)) in out.iter_mut().zip(self.waiting.drain(..due)) {
-                *slot = byte;
-            }
-            due
-        }
-        fn next_due(&self) -> Option<Instant> {
-            self.waiting.front().map(|(t, _)| *t)
-        }
-        fn baud(&self) -> u32 {
-            115_200
-        }
-    }
-
-    fn at(us: u64) -> Instant {
-        Instant::from_ticks(us)
-    }
-
-    #[test]
-    fn every_byte_takes_ten_bit_times_each_way() {
-        let mut line = Echo::line(1_000, 115_200);
-        assert_eq!(line.write(&[1, 2, 3], at(0)), 3);
-        // 86.8 us to the device, 1,000 us in it, 86.8 us back.
-        assert_eq!(line.available(at(1_173)), 0);
-        assert_eq!(line.available(at(1_174)), 1);
-        assert_eq!(line.available(at(1_348)), 3);
-        let mut out = [0; 8];
-        assert_eq!(line.read(&mut out, at(2_000)), 3);
-        assert_eq!(&out[..3], &[2, 3, 4]);
-        assert_eq!(line.traffic(), (3, 3));
-    }
-
-    #[test]
-    fn ten_thousand_characters_do_not_drift() {
-        let mut line = Echo::line(0, 115_200);
-        for _ in 0..3 {
-            line.write(&[0; 3_000], at(0));
-        }
-        // The queue holds 4,096 and refuses the rest; 4,096 x 86.8055 us = 355.555 ms.
-        let last = line.to_device.back().unwrap().arrival;
-        assert!(last.abs_diff(355_555_555) < 10_000, "{last}");
-    }
-
-    #[test]
-    fn a_wrong_baud_gives_noise_both_ways() {
-        let mut line = Echo::line(0, 9_600);
-        line.write(&[7; 100], at(0));
-        let mut out = [0; 512];
-        let count = line.read(&mut out, at(1_000_000));
-        assert!(count > 100, "echo and noise, got {count}");
-        let right = out[..count].iter().filter(|b| **b == 8).count();
-        assert!(right < count / 8, "{right} of {count} right by chance");
-    }
-
-    #[test]
-    fn a_cut_wire_lets_so_many_characters_pass_and_no_more() {
-        for cut in 0..8 {
-            let mut line = Echo::line(0, 115_200);
-            line.cut_after(cut);
-            line.write(&[1, 2, 3], at(0));
-            let mut out = [0; 8];
-            let answered = line.read(&mut out, at(10_000)) as u64;
-            // Characters go out and come back in turns here.
-            assert_eq!(answered, (cut / 2).min(3), "{cut}");
-            assert_eq!(line.passed(), cut.min(6));
-            assert_eq!(line.is_cut(), cut <= 6);
-        }
-    }
-
-    #[test]
-    fn events_lie_in_the_future_and_end() {
-        let mut line = Echo::line(500, 115_200);
-        line.write(&[1, 2], at(0));
-        let mut now = at(0);
-        let mut events = 0;
-        while let Some(next) = line.next_event(now) {
-            assert!(next > now);
-            now = next;
-            events += 1;
-            assert!(events < 20);
-        }
-        assert_eq!(line.available(now), 2);
-    }
-}
+mod tests;

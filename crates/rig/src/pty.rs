@@ -260,7 +260,8 @@ impl Port {
         let now = self.clock.now();
         // The master's end shows the settings the client has made on its own.
         self.line.run_until(now);
-        self.line.set_baud(tcgetattr(&self.master)?.output_speed());
+        self.line
+            .set_baud(tcgetattr(&self.master)?.output_speed(), now);
         if count > 0 {
             self.line.write(&chunk[..count], now);
             self.last_byte = now;

@@ -5,6 +5,8 @@ use std::sync::{Arc, Mutex};
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use thiserror::Error;
 
+use glove::sc18im::{BaudRefused, SetBaud};
+
 use crate::clock::lock;
 use crate::{Clock, Device, EventSource, Instant, Line};
 
@@ -69,11 +71,11 @@ impl MemoryWire {
         }
     }
 
-    /// Sets this end's rate, as reopening a port does; bytes on their way keep theirs.
+    /// Sets this end's rate, as a UART's divider does: bytes that wait to leave go at the new one.
     pub fn set_baud(&self, baud: u32) {
-        let mut line = lock(&self.core.line);
-        line.run_until(self.clock.now());
-        line.set_baud(baud);
+        let (mut line, now) = (lock(&self.core.line), self.clock.now());
+        line.run_until(now);
+        line.set_baud(baud, now);
     }
 
     /// Pulls the plug (bytes in flight are lost, every call fails) or puts it back.
@@ -124,6 +126,13 @@ impl MemoryWire {
             return Err(WireError::Unplugged);
         }
         Ok(act(&mut lock(&self.core.line), self.clock.now()))
+    }
+}
+
+impl SetBaud for MemoryWire {
+    fn set_baud(&mut self, baud: u32) -> Result<(), BaudRefused> {
+        MemoryWire::set_baud(self, baud);
+        Ok(())
     }
 }
 

@@ -108,6 +108,58 @@ fn after_reset_it_says_ok_at_9600_and_changes_its_baud_when_brg1_is_written() {
 }
 
 #[test]
+fn after_a_new_baud_what_begins_within_a_millisecond_is_lost_and_nothing_after_it() {
+    // A status is three characters: 65 us at 460,800.
+    for (pause_us, answers) in [
+        (0, false),
+        (500, false),
+        (900, false),
+        (1_000, true),
+        (2_000, true),
+    ] {
+        let mut bench = Bench::with(Config::at_baud(115_200), flat);
+        bench.send(&[0x57, 0x00, 0x00, 0x01, 0x00, 0x50]);
+        // Six characters of 86.8 us.
+        bench.clock.advance(Duration::from_micros(521));
+        bench.wire.set_baud(460_800);
+        bench.clock.advance(Duration::from_micros(pause_us));
+        bench.send(&STATUS);
+        bench.wait_ms(5);
+        let answer = bench.drain();
+        assert_eq!(answer == [0xF0], answers, "{pause_us} us: {answer:02X?}");
+    }
+}
+
+#[test]
+fn a_speed_changed_before_the_command_has_left_spoils_the_command() {
+    let mut bench = Bench::with(Config::at_baud(115_200), flat);
+    bench.send(&[0x57, 0x00, 0x00, 0x01, 0x00, 0x50]);
+    bench.clock.advance(Duration::from_micros(200));
+    bench.wire.set_baud(460_800);
+    bench.wait_ms(5);
+    bench.drain();
+    assert_eq!(rig::Device::baud(&bench.glove), 115_200);
+}
+
+#[test]
+fn a_baud_counts_from_the_stop_of_its_message_and_the_command_behind_it_is_lost() {
+    let mut bench = Bench::with(Config::at_baud(115_200), flat);
+    let message = [0x57, 0x00, 0x10, 0x01, 0x00, 0x50];
+    bench.send(&message[..5]);
+    bench.wait_ms(1);
+    assert_eq!(bench.drain(), []);
+    assert_eq!(rig::Device::baud(&bench.glove), 115_200);
+    bench.send(&message[5..]);
+    bench.send(&STATUS);
+    bench.wait_ms(1);
+    assert!(!bench.drain().contains(&0xF0));
+    assert_eq!(rig::Device::baud(&bench.glove), 230_400);
+    bench.wire.set_baud(230_400);
+    bench.wait_ms(700);
+    assert_eq!(bench.ask(&STATUS), [0xF0]);
+}
+
+#[test]
 fn golden_strings_select_a_channel_start_fusion_and_read_eight_bytes() {
     let mut bench = Bench::booted(flat);
     assert_eq!(bench.ask(&CHANNEL_0), []);

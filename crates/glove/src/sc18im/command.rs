@@ -78,8 +78,8 @@ pub fn append_transaction(command: &mut Command, transaction: &Transaction) -> R
 }
 
 /// The command of a batch; ends with a status request if its last transaction reads nothing, since a write is answered
-/// by nothing at all.
-pub fn batch(batch: &Batch) -> Result<(Command, Expected), Error> {
+/// by nothing at all, and where `check` asks for it after every read, too.
+pub fn batch(batch: &Batch, check: bool) -> Result<(Command, Expected), Error> {
     let mut command = Command::new();
     let mut expected = Expected {
         bytes: 0,
@@ -93,7 +93,7 @@ pub fn batch(batch: &Batch) -> Result<(Command, Expected), Error> {
     }
     match batch.last() {
         None => return Err(Error::Unsupported),
-        Some(last) if last.count() == 0 => {
+        Some(last) if check || last.count() == 0 => {
             append(&mut command, &STATUS)?;
             expected.bytes += 1;
             expected.status = true;

@@ -1,6 +1,6 @@
 //! Getting into step with the chip, and finding out why a reply fell short.
 //!
-//! Up: left alone until due → asked for its status (and told the port's speed, [`super::speed`]) → I²C clock written and read back → ready. A short reply: the line
+//! Up: left alone until due → asked for its status (and raised to its speed, [`super::speed`]) → I²C clock written and read back → ready. A short reply: the line
 //! falls quiet → asked for its status → ready with the reason, or down.
 
 use super::command::{self, Command, Expected};
@@ -15,11 +15,10 @@ impl<S: SerialPort> Sc18im<S> {
         if self.tries().is_none() {
             self.counters.resyncs = self.counters.resyncs.wrapping_add(1);
         }
-        let wait = match (tries >= timing::RESYNC_TRIES, self.finds_speed()) {
-            (false, _) => timing::IDLE_TIMEOUT,
-            (true, false) => timing::DEAD_RETRY,
-            // At each of two speeds as often.
-            (true, true) => timing::DEAD_RETRY / 2,
+        let wait = match (tries >= timing::RESYNC_TRIES, self.is_fixed_speed()) {
+            (true, true) => timing::DEAD_RETRY,
+            // At each of four speeds nearly as often.
+            _ => timing::IDLE_TIMEOUT,
         };
         self.state = State::Down {
             due: after(now, wait),
@@ -33,7 +32,7 @@ impl<S: SerialPort> Sc18im<S> {
         self.send(&command::STATUS)?;
         Ok(after(
             now,
-            timing::reply(command::STATUS.len(), 1, 0, self.line_baud),
+            timing::reply(command::STATUS.len(), 1, 0, self.baud()),
         ))
     }
 
@@ -45,8 +44,7 @@ impl<S: SerialPort> Sc18im<S> {
     ) -> Result<Option<Reply>, Error> {
         self.pump(0)?;
         if now >= due {
-            self.tune_for_try(tries);
-            self.begin_probe(tries, now)?;
+            self.begin_try(tries, now)?;
         }
         Ok(None)
     }
@@ -54,7 +52,7 @@ impl<S: SerialPort> Sc18im<S> {
     /// Asks whether the chip is in step.
     pub(super) fn begin_probe(&mut self, tries: u8, now: Instant) -> Result<(), Error> {
         let deadline = self.ask_status(now)?;
-        let answered = timing::serial(command::STATUS.len() + 1, self.line_baud);
+        let answered = timing::serial(command::STATUS.len() + 1, self.baud());
         self.state = State::Probe {
             settled: after(now, answered + timing::QUIET),
             deadline,
@@ -97,7 +95,7 @@ impl<S: SerialPort> Sc18im<S> {
         }
         self.received.clear();
         self.send(&command)?;
-        let wait = timing::reply(command.len(), values.len(), 0, self.line_baud);
+        let wait = timing::reply(command.len(), values.len(), 0, self.baud());
         self.state = State::Setup {
             deadline: after(now, wait),
             tries,

@@ -163,7 +163,8 @@ impl<B: Bus> BusScanner<B> {
             }
             <[u8; SAMPLE_BYTES]>::try_from(sample).map_err(|_| Error::Unsupported)
         });
-        let longest = timing::scan_gap(self.config.baud, self.config.period);
+        let baud = self.bus.line_baud().unwrap_or(self.config.baud);
+        let longest = timing::scan_gap(baud, self.config.period);
         let Some(sensor) = self.sensors.get_mut(k) else {
             return;
         };

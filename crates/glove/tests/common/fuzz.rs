@@ -4,7 +4,7 @@
 use embedded_io::{ErrorKind, ErrorType, Read, ReadReady, Write};
 use glove::Instant;
 use glove::bus::{Batch, Bus, Transaction};
-use glove::sc18im::{Config, Sc18im};
+use glove::sc18im::{BaudRefused, Config, Sc18im, SetBaud};
 use std::cell::RefCell;
 use std::collections::VecDeque;
 use std::rc::Rc;
@@ -40,6 +40,15 @@ struct Line(Rc<RefCell<Inner>>);
 
 impl ErrorType for Line {
     type Error = ErrorKind;
+}
+
+impl SetBaud for Line {
+    fn set_baud(&mut self, baud: u32) -> Result<(), BaudRefused> {
+        match baud {
+            230_400 => Err(BaudRefused::Unsupported(baud)),
+            _ => Ok(()),
+        }
+    }
 }
 
 impl ReadReady for Line {
@@ -143,11 +152,29 @@ fn transaction(address: u8, lengths: u8) -> (Batch, usize) {
 
 /// The machine under a list of operations: bytes of any kind at any time, answers in good order, a line that babbles or
 /// breaks. Whatever comes, a transaction ends in time and gives as many bytes as were asked for; a poll takes a bounded
-/// number of bytes; and with a chip in good order again the machine is up again.
+/// number of bytes; and with a chip in good order again the machine is up again. On a port of one speed, and on one that is
+/// to be raised.
 pub fn sc18im(data: &[u8]) -> Seen {
     let line = Line::default();
+    let fixed = Sc18im::new(line.clone(), Config::default());
+    let seen = under(data, line, fixed);
+    let line = Line::default();
+    let config = Config {
+        raise_to: Some(460_800),
+        ..Config::default()
+    };
+    let raised = Sc18im::new(line.clone(), config).with_set_baud();
+    let also = under(data, line, raised);
+    Seen {
+        replies: seen.replies + also.replies,
+        failures: seen.failures + also.failures,
+        resyncs: seen.resyncs + also.resyncs,
+    }
+}
+
+fn under(data: &[u8], line: Line, machine: Sc18im<Line>) -> Seen {
     let mut bench = Bench {
-        machine: Sc18im::new(line.clone(), Config::default()),
+        machine,
         line,
         now: 0,
         asked: None,

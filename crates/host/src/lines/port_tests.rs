@@ -6,6 +6,7 @@ use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
 use super::*;
 use crate::failure::Failure;
+use glove::sc18im::SetBaud as _;
 
 /// A master side and the path of its slave.
 fn pair() -> (OwnedFd, PathBuf) {
@@ -149,21 +150,21 @@ fn the_speed_changes_on_the_open_port_and_survives_its_return() {
     let (master, path) = pair();
     let mut port = Port::open(&path, BAUD).unwrap();
     let seen = || rustix::termios::tcgetattr(&master).unwrap().output_speed();
-    assert!(port.set_baud(9_600));
+    port.set_baud(9_600).unwrap();
     assert_eq!(seen(), 9_600);
     rustix::io::write(&master, &[7]).unwrap();
     assert!(until(|| port.read_ready() == Ok(true)));
-    assert!(port.set_baud(BAUD));
+    port.set_baud(BAUD).unwrap();
     assert_eq!(seen(), BAUD);
     assert_eq!(
         port.read_ready(),
         Ok(false),
         "what came at the old speed is noise"
     );
-    assert!(port.set_baud(9_600));
+    port.set_baud(9_600).unwrap();
     drop(master);
     assert!(until(|| port.write(&[1]) == Err(Error::Unplugged)));
-    assert!(port.set_baud(19_200), "a port that is away keeps it");
+    port.set_baud(19_200).expect("a port that is away keeps it");
     assert_eq!(
         port.shared.baud.load(std::sync::atomic::Ordering::Relaxed),
         19_200

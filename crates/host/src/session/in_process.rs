@@ -105,7 +105,7 @@ impl InProcess {
                     baud: BAUD,
                     ..scan::Config::default()
                 };
-                let scanner = Scanner::new(glove, scan).with_set_baud(Port::set_baud);
+                let scanner = Scanner::new(glove, scan).with_set_baud();
                 let gripper = driver(gripper, line);
                 let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);
                 worker.scheduling = scheduling.recv().unwrap_or(Scheduling::Shared);

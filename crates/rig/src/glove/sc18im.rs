@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 
 use super::bus::{Bus, Orientation, Segment, Status, Timing};
+use crate::line::character_ns;
 use crate::{Duration, Instant};
 
 /// A message whose next byte takes longer than this is forgotten (unconfirmed).
@@ -15,6 +16,8 @@ pub const IDLE_TIMEOUT: Duration = Duration::from_millis(655);
 pub const MAX_DATA: usize = 16;
 /// From the end of a reset to the first bit of `OK` (assumed).
 const HELLO: Duration = Duration::from_millis(1);
+/// After a new baud its UART needs this long (the sheet's "wait 1 ms"): a character that begins before is lost.
+const SETTLE: Duration = Duration::from_millis(1);
 /// Receive FIFO, in bytes; more arriving while the bus is busy is lost.
 const FIFO: usize = 16;
 const CRYSTAL: u64 = 7_372_800;
@@ -80,6 +83,10 @@ pub(super) struct Sc18im {
     /// A part of the message asks for more than the chip holds.
     refused: bool,
     baud_written: bool,
+    /// A new baud was taken: what begins before this is lost.
+    deaf_before: Instant,
+    /// The same moment, until it has come.
+    settles: Option<Instant>,
     fifo: VecDeque<u8>,
     last_byte: Instant,
     /// When the message on the bus ends, and what it answers then.
@@ -106,6 +113,8 @@ impl Sc18im {
             register_list: Vec::new(),
             refused: false,
             baud_written: false,
+            deaf_before: Instant::from_ticks(0),
+            settles: None,
             fifo: VecDeque::new(),
             last_byte: now,
             busy: None,
@@ -137,6 +146,8 @@ impl Sc18im {
         self.to_client.clear();
         self.hung = false;
         self.asleep = false;
+        self.baud_written = false;
+        (self.settles, self.deaf_before) = (None, Instant::from_ticks(0));
         self.busy = Some((now + HELLO, b"OK".to_vec()));
     }
 
@@ -150,11 +161,21 @@ impl Sc18im {
     }
 
     pub fn next_due(&self) -> Option<Instant> {
-        self.busy.as_ref().map(|(at, _)| *at)
+        let busy = self.busy.as_ref().map(|(at, _)| *at);
+        busy.into_iter().chain(self.settles).min()
+    }
+
+    /// Whether a character whose last bit came at `now` began while the UART was being set to a new baud.
+    fn straddles(&self, now: Instant) -> bool {
+        let takes = Duration::from_micros(character_ns(self.baud).div_ceil(1_000));
+        now < self.deaf_before + takes && self.deaf_before.as_ticks() > 0
     }
 
     /// One byte from the UART.
     pub fn receive(&mut self, byte: u8, now: Instant, bus: &mut Bus, orientation: Orientation<'_>) {
+        if self.straddles(now) {
+            return;
+        }
         if core::mem::take(&mut self.asleep) {
             return;
         }
@@ -175,6 +196,7 @@ impl Sc18im {
 
     /// Ends what is due by `now` and goes on with the bytes that waited for it.
     pub fn proceed(&mut self, now: Instant, bus: &mut Bus, orientation: Orientation<'_>) {
+        self.settles = self.settles.filter(|until| *until > now);
         loop {
             if self.hung {
                 if bus.dead {
@@ -223,7 +245,7 @@ impl Sc18im {
             },
             Expect::ReadRegister => self.read_register(byte),
             Expect::WriteRegister if byte == b'P' => {
-                self.apply_baud();
+                self.apply_baud(now);
                 Expect::Command
             }
             Expect::WriteRegister => Expect::WriteValue { register: byte },
@@ -338,12 +360,14 @@ impl Sc18im {
     }
 
     /// A new baud counts from the `P` of the message that wrote BRG1: the `P` itself still comes at
-    /// the old one.
-    fn apply_baud(&mut self) {
+    /// the old one. What begins within [`SETTLE`] of it is lost.
+    fn apply_baud(&mut self, now: Instant) {
         if core::mem::take(&mut self.baud_written) {
             let divider =
                 u16::from_le_bytes([self.registers[reg::BRG0], self.registers[reg::BRG1]]);
             self.baud = (CRYSTAL / (16 + u64::from(divider))) as u32;
+            self.deaf_before = now + SETTLE;
+            self.settles = Some(self.deaf_before);
         }
     }
 

@@ -63,9 +63,13 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         words::activation(activation)
     ));
     let glove = probe::open_glove(&options.glove, interrupt)?;
-    if glove.switched {
+    if let Some(baud) = glove.switched {
+        let why = match baud {
+            9_600 => "as after power-on",
+            _ => "where it was left",
+        };
         tell.say(format_args!(
-            "glove    {}  spoke 9600 baud, as after power-on; switched it to {BAUD}",
+            "glove    {}  spoke {baud} baud, {why}; switched it to {BAUD}",
             options.glove.display()
         ));
     }
