@@ -2,6 +2,7 @@
 //! find. The short form runs with all tests; the whole is `cargo xtask campaign glove`, and its figures are in
 //! `docs/measurements/glove.md`.
 
+mod common;
 mod honest;
 
 use glove::calibration::{Doubt, Identity, Verdict};
@@ -70,6 +71,18 @@ fn an_exact_person_without_soft_tissue_is_measured_within_a_degree() {
     assert!(came.corrected.mcp(0) <= 1.5);
 }
 
+#[test]
+fn from_power_on_through_the_line_and_the_scanner_it_is_the_same() {
+    let mut course = Course::new(2);
+    (course.by_wire, course.lasts) = (true, 20.0);
+    let came = run(&course);
+    println!("{:.2?}", came.corrected.row());
+    assert_eq!(came.outcome.checks.identity, Identity::AsWired);
+    assert_eq!(doubts(&came), Vec::<String>::new());
+    assert!(came.corrected.hinges() <= 2.8);
+    assert!(came.corrected.mcp(0) <= 4.0);
+}
+
 fn heading() {
     println!(
         "| | ten hinges | PIP | DIP | thumb | MCP flex | abd | twist | CMC flex | abd | twist |"
@@ -101,7 +114,7 @@ fn ten_minutes(name: &str, course: impl Fn(u64) -> Course) -> Vec<Came> {
         })
         .collect();
     let cames = each(&courses, run);
-    line(&format!("{name}"), &pooled(&cames, |c| &c.corrected));
+    line(name, &pooled(&cames, |c| &c.corrected));
     line("… last minute", &pooled(&cames, |c| &c.last_minute));
     line("… not corrected", &pooled(&cames, |c| &c.plain));
     line(
@@ -154,9 +167,9 @@ fn campaign_ten_minutes_of_many_persons() {
 #[test]
 #[ignore = "minutes: cargo xtask campaign glove"]
 fn campaign_checks_of_correct_sessions() {
-    let courses: Vec<Course> = (0..120)
+    let courses: Vec<Course> = (0..600)
         .map(|i| {
-            let mut course = Course::new(1_000 + i);
+            let mut course = Course::new(10_000 + i);
             course.traits.is_left = i % 4 == 3;
             course
         })

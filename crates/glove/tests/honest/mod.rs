@@ -6,6 +6,7 @@
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 
+use crate::common::Bench;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -17,7 +18,7 @@ use rig::glove::{Honest, VirtualGlove};
 use rig::person::{Attitude, Person, Prompt, Task, Traits, guided};
 
 /// When the session begins, seconds after the clock's start.
-pub const BEGINS: f64 = 1.0;
+pub const BEGINS: f64 = 3.0;
 /// When the use begins.
 pub const USE_FROM: f64 = BEGINS + 58.0;
 /// From when on, and until when, a flat pose in use is taken after it was asked for.
@@ -39,6 +40,8 @@ pub struct Course {
     pub flat_each: f64,
     /// This segment's sensor slips by the angle (degrees) about an axis of the segment, before the last flat pose.
     pub slip: Option<(usize, f64, [f64; 3])>,
+    /// Through the serial line at 115,200 baud, by a scanner from power-on.
+    pub by_wire: bool,
 }
 
 impl Course {
@@ -56,6 +59,7 @@ impl Course {
             lasts: 0.0,
             flat_each: 60.0,
             slip: None,
+            by_wire: false,
         }
     }
 
@@ -178,37 +182,80 @@ pub struct Came {
     pub found: usize,
 }
 
-/// The chips, and what their bytes pass through before they count.
-struct Way {
-    glove: VirtualGlove,
-    reads: Reads,
+/// Where scans come from.
+enum Way {
+    /// The chips' registers.
+    Registers {
+        glove: VirtualGlove,
+        reads: Reads,
+        scans: u64,
+    },
+    /// The serial line, and a scanner on it from power-on.
+    Wire(Box<Bench>),
+}
+
+struct Scans {
+    way: Way,
     align: Align,
 }
 
-impl Way {
+impl Scans {
     fn new(course: &Course, person: Person) -> Self {
         let config = rig::glove::Config {
             side: course.side(),
             honest: Some(course.honest.clone()),
             ..rig::glove::Config::at_baud(115_200)
         };
-        let glove = VirtualGlove::new(Box::new(person), config);
-        glove.bring_up(usize::MAX, instant(BEGINS - 0.1));
+        let way = if course.by_wire {
+            let bench = Bench::worn(config, Box::new(person), glove::scan::Config::default());
+            Way::Wire(Box::new(bench))
+        } else {
+            let glove = VirtualGlove::new(Box::new(person), config);
+            glove.bring_up(usize::MAX, instant(BEGINS - 0.1));
+            let (reads, scans) = (Reads::new(), 0);
+            Way::Registers {
+                glove,
+                reads,
+                scans,
+            }
+        };
         Self {
-            glove,
-            reads: Reads::new(),
+            way,
             align: Align::new(),
         }
     }
 
-    fn scan(&mut self, at: f64) -> Aligned {
-        let reads = std::array::from_fn(|k| {
-            let stamp = instant(at + 1.8e-3 * k as f64);
-            (self.glove.read_sample(k, stamp), stamp)
-        });
-        let frame = self.reads.frame(&reads);
+    fn glove(&self) -> &VirtualGlove {
+        match &self.way {
+            Way::Registers { glove, .. } => glove,
+            Way::Wire(bench) => &bench.glove,
+        }
+    }
+
+    /// The next scan.
+    fn next(&mut self) -> Aligned {
+        let frame = match &mut self.way {
+            Way::Registers {
+                glove,
+                reads,
+                scans,
+            } => {
+                let at = BEGINS + *scans as f64 / RATE;
+                *scans += 1;
+                let row = std::array::from_fn(|k| {
+                    let stamp = instant(at + 1.8e-3 * k as f64);
+                    (glove.read_sample(k, stamp), stamp)
+                });
+                reads.frame(&row)
+            }
+            Way::Wire(bench) => bench.next_frame(),
+        };
         self.align.take(&frame)
     }
+}
+
+fn seconds(at: Instant) -> f64 {
+    at.as_ticks() as f64 * 1e-6
 }
 
 fn instant(seconds: f64) -> Instant {
@@ -232,8 +279,8 @@ pub fn steps() -> Vec<(Step, Prompt)> {
 
 pub fn run(course: &Course) -> Came {
     let person = course.person();
-    let mut way = Way::new(course, person.clone());
-    let (outcome, ended) = calibrate(course, &mut way);
+    let mut scans = Scans::new(course, person.clone());
+    let (outcome, ended) = calibrate(course, &mut scans);
     let mut headings = Headings::start(&outcome, ended, Config::default());
     let mut came = Came {
         outcome,
@@ -247,10 +294,12 @@ pub fn run(course: &Course) -> Came {
         found: 0,
     };
     let (flats, mut asked) = (course.flats(), false);
-    let first = ((USE_FROM - BEGINS) * RATE) as u64;
-    for i in 0..(course.lasts * RATE) as u64 {
-        let at = BEGINS + (first + i) as f64 / RATE;
-        let aligned = way.scan(at);
+    loop {
+        let aligned = scans.next();
+        let at = seconds(aligned.at);
+        if at >= USE_FROM + course.lasts {
+            break;
+        }
         let lying = flats
             .iter()
             .find(|f| (**f..**f + FLAT_TAKEN[1] + 0.1).contains(&at));
@@ -264,10 +313,10 @@ pub fn run(course: &Course) -> Came {
         }
         asked = taking;
         came.found += usize::from(reading.pose.is_some());
-        if lying.is_some() {
+        if lying.is_some() || at < USE_FROM {
             continue;
         }
-        let truth = person.angles(aligned.at.as_ticks() as f64 * 1e-6 - LATCH);
+        let truth = person.angles(at - LATCH);
         let plain = angles_of(&came.outcome.profile, &came.outcome.headings, &aligned);
         let missing = reading_mask(&aligned);
         came.corrected.add(&reading.angles, reading.held, &truth);
@@ -277,23 +326,27 @@ pub fn run(course: &Course) -> Came {
             came.plain_last_minute.add(&plain, missing, &truth);
         }
     }
-    (came.repaired, came.dropped) = (way.reads.repaired, way.reads.dropped);
+    if let Way::Registers { reads, .. } = &scans.way {
+        (came.repaired, came.dropped) = (reads.repaired, reads.dropped);
+    }
     came
 }
 
 /// The session, and when its last step ended.
-fn calibrate(course: &Course, way: &mut Way) -> (Outcome, Instant) {
+fn calibrate(course: &Course, scans: &mut Scans) -> (Outcome, Instant) {
     let steps = steps();
     let mut session = Session::new();
     let mut slip = course.slip;
-    for i in 0.. {
-        let at = BEGINS + f64::from(i) / RATE;
+    loop {
+        let aligned = scans.next();
+        let at = seconds(aligned.at);
         if at > BEGINS + 53.5
             && let Some((segment, degrees, axis)) = slip.take()
         {
-            way.glove.slip(course.honest.seats[segment], axis, degrees);
+            scans
+                .glove()
+                .slip(course.honest.seats[segment], axis, degrees);
         }
-        let aligned = way.scan(at);
         let window = |p: &Prompt| (BEGINS + p.from..BEGINS + p.to).contains(&at);
         let step = steps.iter().find(|(_, p)| window(p)).map(|(step, _)| *step);
         if step != session.step() {
@@ -307,7 +360,6 @@ fn calibrate(course: &Course, way: &mut Way) -> (Outcome, Instant) {
         }
         session.take(&aligned);
     }
-    unreachable!("the session ends")
 }
 
 /// Angles beside a sensor that is not there.
