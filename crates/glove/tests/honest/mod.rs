@@ -6,6 +6,8 @@
 
 #![allow(dead_code, reason = "each test takes what it needs")]
 
+mod tally;
+
 use crate::common::Bench;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -16,6 +18,7 @@ use glove::hand::{self, JOINT_COUNT, Quaternion, SEGMENT_COUNT, Side};
 use glove::headings::{Config, Headings};
 use rig::glove::{Honest, VirtualGlove};
 use rig::person::{Attitude, Person, Prompt, Task, Traits, guided};
+pub use tally::Tally;
 
 /// When the session begins, seconds after the clock's start.
 pub const BEGINS: f64 = 3.0;
@@ -93,78 +96,6 @@ impl Course {
     }
 }
 
-/// Squares of errors by joint, degrees².
-#[derive(Debug, Clone, Copy, Default)]
-pub struct Tally {
-    squares: [f64; JOINT_COUNT],
-    n: [f64; JOINT_COUNT],
-    held: f64,
-}
-
-impl Tally {
-    fn add(&mut self, angles: &[f32; JOINT_COUNT], held: u32, truth: &[f64; JOINT_COUNT]) {
-        for j in 0..JOINT_COUNT {
-            if held >> j & 1 == 1 {
-                self.held += 1.0;
-                continue;
-            }
-            let off = (f64::from(angles[j]) - truth[j]).to_degrees();
-            let off = (off + 180.0).rem_euclid(360.0) - 180.0;
-            self.squares[j] += off * off;
-            self.n[j] += 1.0;
-        }
-    }
-
-    pub fn join(&mut self, other: &Self) {
-        for j in 0..JOINT_COUNT {
-            self.squares[j] += other.squares[j];
-            self.n[j] += other.n[j];
-        }
-        self.held += other.held;
-    }
-
-    /// RMS over the joints that belong, degrees.
-    pub fn rms(&self, belongs: impl Fn(usize) -> bool) -> f64 {
-        let of = |values: &[f64; JOINT_COUNT]| -> f64 {
-            (0..JOINT_COUNT)
-                .filter(|&j| belongs(j))
-                .map(|j| values[j])
-                .sum()
-        };
-        (of(&self.squares) / of(&self.n).max(1.0)).sqrt()
-    }
-
-    pub fn hinges(&self) -> f64 {
-        self.rms(|j| j % 5 >= 3)
-    }
-
-    /// Of the four fingers' MCP joints: flexion 0, abduction 1, twist 2.
-    pub fn mcp(&self, which: usize) -> f64 {
-        self.rms(|j| j >= 5 && j % 5 == which)
-    }
-
-    /// Share of the angles that were held.
-    pub fn held(&self) -> f64 {
-        self.held / (self.held + self.n.iter().sum::<f64>()).max(1.0)
-    }
-
-    /// Ten hinges, PIP, DIP, thumb's; MCP flexion, abduction, twist; CMC flexion, abduction, twist.
-    pub fn row(&self) -> [f64; 10] {
-        [
-            self.hinges(),
-            self.rms(|j| j >= 5 && j % 5 == 3),
-            self.rms(|j| j >= 5 && j % 5 == 4),
-            self.rms(|j| j == 3 || j == 4),
-            self.mcp(0),
-            self.mcp(1),
-            self.mcp(2),
-            self.rms(|j| j == 0),
-            self.rms(|j| j == 1),
-            self.rms(|j| j == 2),
-        ]
-    }
-}
-
 /// What came of it.
 pub struct Came {
     pub outcome: Outcome,
@@ -187,7 +118,7 @@ enum Way {
     /// The chips' registers.
     Registers {
         glove: VirtualGlove,
-        reads: Reads,
+        reads: Box<Reads>,
         scans: u64,
     },
     /// The serial line, and a scanner on it from power-on.
@@ -212,7 +143,7 @@ impl Scans {
         } else {
             let glove = VirtualGlove::new(Box::new(person), config);
             glove.bring_up(usize::MAX, instant(BEGINS - 0.1));
-            let (reads, scans) = (Reads::new(), 0);
+            let (reads, scans) = (Box::new(Reads::new()), 0);
             Way::Registers {
                 glove,
                 reads,
@@ -372,12 +303,8 @@ fn reading_mask(aligned: &Aligned) -> u32 {
 /// The angles by fixed headings: what there would be without the filters.
 fn angles_of(profile: &Profile, headings: &[f32; 16], aligned: &Aligned) -> [f32; JOINT_COUNT] {
     let about_up = |by: f32| {
-        Quaternion::new_unchecked(glove_quaternion(
-            (0.5 * by).cos(),
-            0.0,
-            0.0,
-            (0.5 * by).sin(),
-        ))
+        let (sin, cos) = (0.5 * by).sin_cos();
+        Quaternion::new_unchecked(nalgebra::Quaternion::new(cos, 0.0, 0.0, sin))
     };
     let segments: [Quaternion; SEGMENT_COUNT] = std::array::from_fn(|k| {
         let q = aligned.orientations[usize::from(profile.sensors[k])];
@@ -416,10 +343,6 @@ fn angles_of(profile: &Profile, headings: &[f32; 16], aligned: &Aligned) -> [f32
         }
     }
     angles
-}
-
-fn glove_quaternion(w: f32, i: f32, j: f32, k: f32) -> nalgebra::Quaternion<f32> {
-    nalgebra::Quaternion::new(w, i, j, k)
 }
 
 /// Runs `work` on all items, on as many threads as the machine has; results in the items' order.

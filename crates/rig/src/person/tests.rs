@@ -115,11 +115,9 @@ fn a_posture_that_is_asked_for_is_taken_with_the_persons_error_and_lateness() {
             .map(|(a, w)| (a - w).abs().to_degrees());
         far.fold(0.0, f64::max)
     };
-    assert!(
-        off(10.4) > 15.0,
-        "still doing something else: {}",
-        off(10.4)
-    );
+    let never_asked = Person::new(person.traits.clone());
+    assert_eq!(person.angles(10.49), never_asked.angles(10.49), "too early");
+    assert_ne!(person.angles(10.6), never_asked.angles(10.6));
     assert!((0.5..10.0).contains(&off(11.5)), "{}", off(11.5));
 }
 
