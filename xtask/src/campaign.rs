@@ -21,6 +21,27 @@ pub fn gripper() -> Result<(), Failure> {
     )
 }
 
+/// The glove's: ten minutes of 24 virtual persons in honest gloves, in each attitude; the checks on 600 correct sessions, all 120
+/// swapped pairs and 144 slips.
+pub fn glove() -> Result<(), Failure> {
+    step::run(
+        "glove campaigns",
+        &mut cargo(&[
+            "test",
+            "--locked",
+            "--package",
+            "glove",
+            "--test",
+            "honest_glove",
+            "--",
+            "--ignored",
+            "--nocapture",
+            "--test-threads",
+            "1",
+        ]),
+    )
+}
+
 /// 50 stalls of 0.1 to 3 s with real processes, on the PC and in QEMU.
 pub fn stalls() -> Result<(), Failure> {
     let firmware = crate::firmware::build()?;

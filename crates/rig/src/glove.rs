@@ -6,6 +6,7 @@
 mod bno055;
 mod bus;
 mod faults;
+mod honest;
 mod sc18im;
 
 use std::sync::{Arc, Mutex};
@@ -17,11 +18,13 @@ use rand_chacha::ChaCha8Rng;
 pub use ::glove::hand::Side;
 pub use bno055::{BOOT, ENTER_CONFIG, FUSION_PERIOD, LEAVE_CONFIG};
 pub use faults::Counters;
+pub use honest::Honest;
 pub use sc18im::{Chip, IDLE_TIMEOUT, MAX_DATA};
 
 use crate::clock::lock;
 use crate::{Device, Instant, PoseSource};
 use bus::Bus;
+use honest::Worn;
 use sc18im::Sc18im;
 
 /// How the virtual glove is built.
@@ -41,6 +44,9 @@ pub struct Config {
     pub world: [f32; 4],
     /// How each sensor sits on its segment, w x y z: it reports world · segment · mounting.
     pub mounting: [[f32; 4]; 16],
+    /// Sensors as they really are; `mounting` and `dither` then count for nothing. `None`: sensors that sit as `mounting` says, whose
+    /// headings agree and stay, on a hand whose joints turn about the axes that `docs/hand-model.md` draws.
+    pub honest: Option<Honest>,
     /// When it was powered on: the sensors answer 650 ms later.
     pub power_on: Instant,
 }
@@ -54,6 +60,7 @@ impl Default for Config {
             dither: Some(1),
             world: [1.0, 0.0, 0.0, 0.0],
             mounting: [[1.0, 0.0, 0.0, 0.0]; 16],
+            honest: None,
             power_on: Instant::from_ticks(0),
         }
     }
@@ -93,6 +100,7 @@ struct Hand {
     dither: Option<u64>,
     /// Turn of each sensor's world about the vertical.
     heading: [UnitQuaternion<f32>; 16],
+    honest: Option<Worn>,
 }
 
 fn unit([w, x, y, z]: [f32; 4]) -> UnitQuaternion<f32> {
@@ -100,12 +108,31 @@ fn unit([w, x, y, z]: [f32; 4]) -> UnitQuaternion<f32> {
     UnitQuaternion::try_new(q, 1e-6).unwrap_or_else(UnitQuaternion::identity)
 }
 
+fn exact_unit([w, x, y, z]: [f64; 4]) -> UnitQuaternion<f64> {
+    let q = Quaternion::new(w, x, y, z);
+    UnitQuaternion::try_new(q, 1e-9).unwrap_or_else(UnitQuaternion::identity)
+}
+
 impl Hand {
-    /// What sensor `index` measures at `at`: w, x, y, z.
-    fn orientation(&mut self, index: usize, at: Instant) -> [f32; 4] {
-        let angles = self.pose.pose_at(at.as_ticks() as f64 * 1e-6);
+    /// Leaves an honest glove's noise out, or not.
+    fn be_quiet(&mut self, quiet: bool) {
+        if let Some(worn) = &mut self.honest {
+            worn.quiet = quiet;
+        }
+    }
+
+    /// What sensor `index` measures at `at`, in the `start`th run of its fusion: w, x, y, z.
+    fn orientation(&mut self, index: usize, start: u32, at: Instant) -> [f32; 4] {
+        let time_s = at.as_ticks() as f64 * 1e-6;
+        let angles = self.pose.pose_at(time_s);
+        let attitude = self.pose.attitude_at(time_s);
+        if let Some(worn) = &mut self.honest {
+            let attitude = attitude.map_or_else(|| self.world.cast(), exact_unit);
+            return worn.measures(index, start, time_s, &angles, &attitude);
+        }
+        let world = attitude.map_or(self.world, |q| unit(q.map(|c| c as f32)));
         let segments = ::glove::hand::segment_orientations(&angles, self.side);
-        let q = self.heading[index] * self.world * segments[index] * self.mounting[index];
+        let q = self.heading[index] * world * segments[index] * self.mounting[index];
         let mut components = [q.w, q.i, q.j, q.k];
         if let Some(seed) = self.dither {
             let stream = (at.as_ticks() << 4) | index as u64;
@@ -130,10 +157,15 @@ impl VirtualGlove {
             mounting: config.mounting.map(unit),
             dither: config.dither,
             heading: [UnitQuaternion::identity(); 16],
+            honest: config.honest.map(|honest| Worn::new(honest, config.side)),
         };
+        let mut bus = Bus::new(config.power_on);
+        for (index, chip) in bus.sensors.iter_mut().enumerate() {
+            chip.flips = hand.honest.as_ref().map(|worn| worn.flips(index));
+        }
         let state = State {
             bridge: Sc18im::new(config.chip, config.baud, config.power_on),
-            bus: Bus::new(config.power_on),
+            bus,
             hand,
             off: false,
         };
@@ -155,7 +187,11 @@ impl VirtualGlove {
             hand,
             off,
         } = &mut *state;
-        (!*off).then(|| act(bridge, bus, &mut |index, at| hand.orientation(index, at)))
+        (!*off).then(|| {
+            act(bridge, bus, &mut |index, start, at| {
+                hand.orientation(index, start, at)
+            })
+        })
     }
 }
 

@@ -9,6 +9,7 @@
 //! | piece | what it is |
 //! |---|---|
 //! | [`glove::VirtualGlove`] | SC18IM serial-to-I2C bridge + TCA9548A + 16 BNO055, fed by a [`PoseSource`] |
+//! | [`person::Person`] | a hand that does what is asked, late and never quite straight |
 //! | [`gripper::VirtualGripper`] | Robotiq gripper behind Modbus RTU |
 //! | [`MemoryWire`] | a UART in memory: every byte takes its time on a [`Clock`] |
 //! | [`pty::PtyDevice`] | the same device behind a pseudo-terminal, in real time |
@@ -19,6 +20,7 @@
 //! Nothing here is tried on hardware: it follows the documents.
 #![forbid(unsafe_code)]
 
+mod chance;
 mod clock;
 mod device;
 pub mod faulty;
@@ -26,6 +28,7 @@ pub mod flash;
 pub mod glove;
 pub mod gripper;
 mod line;
+pub mod person;
 mod pose;
 pub mod pty;
 pub mod skip;

@@ -11,6 +11,12 @@ pub trait PoseSource: Send {
     /// after the clock's start.
     fn pose_at(&mut self, time_s: f64) -> [f32; 25];
 
+    /// The hand's own orientation at that time (w, x, y, z) in a world whose z is up; `None` where the source knows fingers
+    /// only, and the glove's own [`world`](crate::glove::Config::world) counts.
+    fn attitude_at(&mut self, _time_s: f64) -> Option<[f64; 4]> {
+        None
+    }
+
     /// A client has opened the glove's port, which nobody had open.
     fn opened(&mut self) {}
 

@@ -45,8 +45,16 @@ impl Bench {
         pose: impl FnMut(f64) -> [f32; 25] + Send + 'static,
         config: Config,
     ) -> Self {
+        Self::worn(virtual_glove, Box::new(pose), config)
+    }
+
+    pub fn worn(
+        virtual_glove: rig::glove::Config,
+        pose: Box<dyn rig::PoseSource>,
+        config: Config,
+    ) -> Self {
         let clock = Clock::new();
-        let glove = VirtualGlove::new(Box::new(pose), virtual_glove);
+        let glove = VirtualGlove::new(pose, virtual_glove);
         let wire = MemoryWire::new(&clock, glove.clone(), config.baud);
         let scanner = Scanner::new(wire.clone(), config);
         Self {
@@ -81,6 +89,21 @@ impl Bench {
             .into_iter()
             .map(|(_, frame)| frame)
             .collect()
+    }
+
+    /// Runs until the next frame.
+    pub fn next_frame(&mut self) -> Frame {
+        let late = self.clock.now() + glove::Duration::from_ticks(3_000_000);
+        while self.clock.now() < late {
+            let now = self.clock.now();
+            if let Some(frame) = self.scanner.poll(now) {
+                return frame;
+            }
+            let due = self.scanner.next_due().unwrap_or(late).min(late);
+            let next = Instant::from_ticks(now.as_ticks() + 1);
+            self.clock.wait_until(due.max(next));
+        }
+        panic!("no frame: {:?}", self.scanner.health());
     }
 
     pub fn for_ms(&mut self, ms: u64) -> Vec<Frame> {

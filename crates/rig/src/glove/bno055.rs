@@ -5,6 +5,7 @@
 //! output. What is not: raw magnetometer, Euler angles (they read zero), interrupts, units other
 //! than the data sheet's first ones.
 
+use crate::chance::Chance;
 use crate::{Duration, Instant};
 
 /// A reset or power-on takes this long; every access gets a NACK meanwhile.
@@ -84,6 +85,12 @@ pub(super) struct Bno055 {
     switching: Option<(Instant, u8)>,
     fusion_since: Option<Instant>,
     ticks: u64,
+    /// How often the fusion has begun: each time with a heading of its own.
+    pub starts: u32,
+    /// Bits that flip by themselves: the share of the reads.
+    pub flips: Option<(Chance, f64)>,
+    /// Reads so far.
+    reads: i64,
     pub faults: Faults,
 }
 
@@ -100,6 +107,9 @@ impl Bno055 {
             switching: None,
             fusion_since: None,
             ticks: 0,
+            starts: 0,
+            flips: None,
+            reads: 0,
             faults: Faults::default(),
         };
         chip.reset();
@@ -196,6 +206,32 @@ impl Bno055 {
             *slot = self.register(self.page, address);
         }
         self.flip_sign(self.pointer, out);
+        self.flip_by_chance(out);
+    }
+
+    /// Booted by `now`, and in IMU mode since `since`.
+    pub fn run_since(&mut self, since: Instant, now: Instant) {
+        self.reset();
+        self.boot_until = now;
+        self.store(reg::UNIT_SEL, 0);
+        self.switching = Some((since, IMU));
+        self.catch_up(now);
+    }
+
+    /// The eight bytes of the quaternion, as a client reads them: it writes the address, then reads. `None` where the chip does not
+    /// acknowledge.
+    pub fn sample(
+        &mut self,
+        now: Instant,
+        orientation: &mut dyn FnMut(u32, Instant) -> [f32; 4],
+    ) -> Option<[u8; 8]> {
+        if !self.acknowledges(now) {
+            return None;
+        }
+        self.write(&[reg::QUATERNION], now);
+        let (mut bytes, start) = ([0; 8], self.starts);
+        self.read(&mut bytes, now, &mut |t| orientation(start, t));
+        Some(bytes)
     }
 
     /// A register as a read would give it, without moving the pointer.
@@ -235,6 +271,7 @@ impl Bno055 {
         self.mode = mode;
         self.ticks = 0;
         self.fusion_since = (IMU..=NDOF).contains(&mode).then_some(at);
+        self.starts += u32::from(self.fusion_since.is_some());
         self.clear_outputs();
     }
 
@@ -342,14 +379,30 @@ impl Bno055 {
         let Some((component, left)) = self.faults.flip.filter(|(_, left)| *left > 0) else {
             return;
         };
-        let high = usize::from(reg::QUATERNION) + 2 * component.min(3) + 1;
-        let slot = high
-            .checked_sub(usize::from(first))
-            .and_then(|at| out.get_mut(at));
-        if let Some(byte) = slot.filter(|_| self.page == 0) {
+        if let Some(byte) = self.high_byte(component, first, out) {
             *byte ^= 0x80;
             self.faults.flip = Some((component, left - 1));
         }
+    }
+
+    fn flip_by_chance(&mut self, out: &mut [u8]) {
+        let Some((chance, share)) = self.flips.filter(|_| self.fusion_since.is_some()) else {
+            return;
+        };
+        self.reads += 1;
+        let component = (chance.bits(-self.reads) % 4) as usize;
+        if chance.share(self.reads) < share
+            && let Some(byte) = self.high_byte(component, self.pointer, out)
+        {
+            *byte ^= 0x80;
+        }
+    }
+
+    /// Where a read from `first` on has the high byte of a component of the quaternion.
+    fn high_byte<'a>(&self, component: usize, first: u8, out: &'a mut [u8]) -> Option<&'a mut u8> {
+        let high = usize::from(reg::QUATERNION) + 2 * component.min(3) + 1;
+        let at = high.checked_sub(usize::from(first))?;
+        out.get_mut(at).filter(|_| self.page == 0)
     }
 }
 

@@ -56,8 +56,8 @@ pub(super) struct Bus {
     pub nacks: u64,
 }
 
-/// Gives the orientation of a sensor (w, x, y, z) at a moment.
-pub(super) type Orientation<'a> = &'a mut dyn FnMut(usize, Instant) -> [f32; 4];
+/// Gives the orientation of a sensor (w, x, y, z) in a run of its fusion, at a moment.
+pub(super) type Orientation<'a> = &'a mut dyn FnMut(usize, u32, Instant) -> [f32; 4];
 
 impl Bus {
     pub fn new(now: Instant) -> Self {
@@ -146,7 +146,9 @@ impl Bus {
                 let at = message.now();
                 for &index in &reached {
                     let mut bytes = vec![0; *count];
-                    self.sensors[index].read(&mut bytes, at, &mut |t| orientation(index, t));
+                    let chip = &mut self.sensors[index];
+                    let start = chip.starts;
+                    chip.read(&mut bytes, at, &mut |t| orientation(index, start, t));
                     joined.iter_mut().zip(&bytes).for_each(|(j, b)| *j &= b);
                 }
                 message.bytes(*count, self.stretch_of(&reached));

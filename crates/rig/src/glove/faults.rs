@@ -142,10 +142,46 @@ impl VirtualGlove {
     #[must_use]
     pub fn true_orientation(&self, index: usize, at: Instant) -> [f32; 4] {
         let mut state = lock(&self.state);
+        let index = index.min(15);
+        let start = state.bus.sensors[index].starts;
         let dither = state.hand.dither.take();
-        let orientation = state.hand.orientation(index.min(15), at);
+        state.hand.be_quiet(true);
+        let orientation = state.hand.orientation(index, start, at);
+        state.hand.be_quiet(false);
         state.hand.dither = dither;
         orientation
+    }
+
+    /// Sensor `index` of an honest glove slips: from now on it sits turned by `degrees` about `axis`, a direction in the frame of the
+    /// segment it sits on.
+    pub fn slip(&self, index: usize, axis: [f64; 3], degrees: f64) {
+        if let Some(worn) = &mut lock(&self.state).hand.honest {
+            worn.slip(index, axis, degrees);
+        }
+    }
+
+    /// Sensor `index` (each, where there is no such) is as a program leaves it that brought it up: booted and in IMU mode, with a
+    /// heading of its own; its 100 Hz began less than 10 ms before `now`.
+    pub fn bring_up(&self, index: usize, now: Instant) {
+        let mut state = lock(&self.state);
+        let super::State { bus, hand, .. } = &mut *state;
+        let chips = bus.sensors.iter_mut().enumerate();
+        for (k, chip) in chips.filter(|(k, _)| *k == index || index > 15) {
+            let phase = hand.honest.as_ref().map_or(0.0, |worn| worn.phase(k));
+            let before = (phase * super::FUSION_PERIOD.as_ticks() as f64) as u64;
+            let since = Instant::from_ticks(now.as_ticks().saturating_sub(before));
+            chip.run_since(since, now);
+        }
+    }
+
+    /// The eight bytes that a read of sensor `index` at its quaternion's registers gives at `now`, past bus and wire: for tests that
+    /// need many samples. `None` where it does not acknowledge. Times must not go back.
+    #[must_use]
+    pub fn read_sample(&self, index: usize, now: Instant) -> Option<[u8; 8]> {
+        let mut state = lock(&self.state);
+        let super::State { bus, hand, off, .. } = &mut *state;
+        let chip = bus.sensors.get_mut(index).filter(|_| !*off)?;
+        chip.sample(now, &mut |start, at| hand.orientation(index, start, at))
     }
 
     /// A register of sensor `index` as a read would show it, without touching the chip's pointer.
