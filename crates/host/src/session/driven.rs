@@ -85,7 +85,7 @@ impl Driven {
         longest.map(|(reason, _)| *reason)
     }
 
-    /// The same, where it was held for longer than it followed, [`BRING_UP`] left out: a run that is ended soon has not failed.
+    /// The same, where it was held for longer than it followed, two seconds of bringing up left out: a run that is ended soon has not failed.
     pub fn mostly_held(&self) -> Option<HoldReason> {
         self.reason()
             .filter(|_| self.held_closed() > self.moving + BRING_UP)
