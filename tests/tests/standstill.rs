@@ -60,6 +60,7 @@ impl Teleop {
     fn until_following(&self) {
         while self.lines.try_recv().is_ok() {}
         let end = Instant::now() + PATIENCE;
+        let mut said = Vec::new();
         while let Ok(line) = self
             .lines
             .recv_timeout(end.saturating_duration_since(Instant::now()))
@@ -67,8 +68,9 @@ impl Teleop {
             if line.contains("following") {
                 return;
             }
+            said.push(line);
         }
-        panic!("it does not follow");
+        panic!("it does not follow: {said:#?}");
     }
 
     fn end(mut self) -> Option<i32> {
@@ -166,5 +168,6 @@ fn no_command_of_the_chip_rests_on_bytes_that_waited_while_it_stood_still() {
         std::thread::sleep(Duration::from_millis(1_500));
     }
     println!("seed {SEED}, QEMU: {stalls:?}, the watchdog started the chip anew {restarts} times");
-    assert!(stalls.commands >= 25, "{stalls:?}");
+    // A command that was judged, or a chip that its watchdog started anew and that commands nothing until it is calibrated.
+    assert!(stalls.commands + restarts >= 45, "{stalls:?}");
 }

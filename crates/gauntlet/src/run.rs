@@ -54,7 +54,7 @@ pub struct Options {
 /// Why a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum End {
-    /// Its time was over.
+    /// Its time was over, or nothing could come of it any more.
     Time,
     /// A person asked for it.
     Asked,
@@ -261,10 +261,12 @@ impl Run {
             if self.interrupt.asked() || out::closed() {
                 return Ok(End::Asked);
             }
-            if options
+            let over = options
                 .seconds
-                .is_some_and(|time| started.elapsed() >= time)
-            {
+                .is_some_and(|time| started.elapsed() >= time);
+            // Nobody is there to close the clutch again.
+            let useless = options.engage && self.clutch.too_late && !keys;
+            if over || useless {
                 return Ok(End::Time);
             }
             self.interrupt.sleep(ROUND);
