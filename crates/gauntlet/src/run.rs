@@ -237,7 +237,7 @@ impl Run {
             "ending other programs: the system lacks descriptors",
         )?;
         if options.engage {
-            self.engage();
+            self.clutch.engage(&*self.session);
         }
         let started = Instant::now();
         self.session.hub().begin();
@@ -276,7 +276,7 @@ impl Run {
     /// Opens the clutch, and waits until the hold has left.
     fn hold_for_a_while(&mut self) -> Result<()> {
         let released = self.clock.now();
-        self.release();
+        self.clutch.release(self.session.orders());
         let end = Instant::now() + SUSPEND_HOLD;
         let mut held = false;
         while !held && Instant::now() < end && !self.interrupt.sleep(ROUND) {
@@ -335,12 +335,12 @@ impl Run {
             _ if !options.drives => {}
             Key::Clutch => {
                 if self.clutch.closed {
-                    self.release();
+                    self.clutch.release(self.session.orders());
                 } else {
-                    self.engage();
+                    self.clutch.engage(&*self.session);
                 }
             }
-            Key::Open => self.release(),
+            Key::Open => self.clutch.release(self.session.orders()),
             // One that is not taken says no word of having begun; who pressed it presses it again.
             Key::Calibrate => {
                 self.session
@@ -365,7 +365,7 @@ impl Run {
             self.session.order(Order::Heartbeat);
         }
         self.clutch.give_release(self.session.orders());
-        self.look_at_clutch();
+        self.clutch.look(&*self.session);
         self.look_at_file_limit();
         self.look_at_events();
         Ok(())

@@ -4,16 +4,6 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Circles that are known and still to be cut.
-const KNOWN: [&[&str]; 2] = [
-    &[
-        "session::chip_stop",
-        "session::chip_worker",
-        "session::on_chip",
-    ],
-    &["run", "run::clutch"],
-];
-
 /// A path, word by word from the crate's root.
 type Words = Vec<String>;
 
@@ -243,10 +233,7 @@ fn no_module_of_the_library_or_of_the_tool_is_in_a_circle() {
         let read = Crate::read(&crates.join(name).join("src"));
         assert!(read.modules.len() > 40, "{name}");
         let circles = read.circles();
-        let new: Vec<_> = (circles.iter())
-            .filter(|circle| !KNOWN.iter().any(|known| circle == known))
-            .collect();
-        assert!(new.is_empty(), "{name}: {new:#?}");
+        assert!(circles.is_empty(), "{name}: {circles:#?}");
     }
 }
 

@@ -3,6 +3,7 @@
 
 use super::table::number;
 use super::{Cell, Error, Kept, Laboratory, Row, Source, Store, Watch, printed};
+use crate::plan::{APPENDIX, Frame, What};
 use crate::principal::Principal;
 use crate::shapes::ShapePair;
 use charts::{CLOUD, Chart, Curve, Key, MARKS, Net, PATH, POINTS, Panel, View};
@@ -42,6 +43,35 @@ pub fn shapes(laboratory: &Laboratory) -> Result<Vec<Vec<Panel>>, Error> {
         targets.push(panel(title, &truth.targets, &boundary.targets));
     }
     Ok(vec![inputs, targets])
+}
+
+/// Figure 3: a row of [`snapshots`] for each cell, on as many threads; `watch` ends it.
+///
+/// # Errors
+/// The first of [`Error`], in the order of the cells.
+pub fn sessions(
+    from: (&Laboratory, &Store),
+    cells: &[Cell],
+    threads: usize,
+    watch: &dyn Watch,
+) -> Result<Vec<Vec<Panel>>, Error> {
+    let mut rows = Vec::new();
+    for cells in cells.chunks(threads.max(1)) {
+        let done: Vec<_> = std::thread::scope(|scope| {
+            let running: Vec<_> = (cells.iter())
+                .map(|cell| scope.spawn(move || snapshots(from, cell, watch)))
+                .collect();
+            let joined = running.into_iter().map(|thread| {
+                let done = thread.join();
+                done.unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            });
+            joined.collect()
+        });
+        for row in done {
+            rows.push(row?);
+        }
+    }
+    Ok(rows)
 }
 
 /// Figure 3: the image of the whole grid under f at the end of each stage, with the pairs so far, for one pair of shapes.
@@ -159,6 +189,41 @@ pub fn fold_share(laboratory: &Laboratory, cell: &Cell, f: &Network<f32>) -> Res
         }
     }
     Ok(if whole > 0.0 { flipped / whole } else { 0.0 })
+}
+
+/// The curves of a figure that has nothing else; `None` for another one, or a table.
+#[must_use]
+pub fn curves(what: What, frame: &Frame, done: &[(Cell, Kept)]) -> Option<Vec<Chart>> {
+    const SP1: [Source; 1] = [Source::Shape(ShapePair::Sp1)];
+    // d̄, VO, d-Knn, NMSE.
+    const ALL: [usize; 4] = [0, 1, 2, 3];
+    const OCCUPANCY: [usize; 1] = [1];
+    const NMSE: [usize; 1] = [3];
+    let hand = [frame.hand];
+    let (of, sources, measures): (fn(_, &[_]) -> _, &[Source], &[usize]) = match what {
+        What::Fig2 => (over_epochs, &SP1, &ALL),
+        What::Fig11 => (over_epochs, &hand, &ALL[..3]),
+        What::Fig14 => (over_epochs, &APPENDIX, &ALL[..1]),
+        What::Fig15 => (over_epochs, &APPENDIX, &OCCUPANCY),
+        What::Fig16 => (over_epochs, &APPENDIX, &ALL[2..3]),
+        What::Fig17 => (over_epochs, &APPENDIX, &NMSE),
+        What::Fig4 => (over_pairs, &SP1, &OCCUPANCY),
+        What::Fig5 => (over_pairs, &SP1, &NMSE),
+        What::Fig10 => (over_pairs, &hand, &ALL[..3]),
+        What::Fig18 => (over_pairs, &APPENDIX, &OCCUPANCY),
+        What::Fig19 => (over_pairs, &APPENDIX, &NMSE),
+        _ => return None,
+    };
+    let is_wanted = |chart: &Chart| {
+        let mut wanted = measures.iter();
+        wanted.any(|&measure| printed::MEASURES[measure] == chart.y_label)
+    };
+    let charts = sources.iter().flat_map(|&source| of(source, done));
+    let charts = charts.filter(is_wanted).map(|chart| Chart {
+        note: frame.describe(),
+        ..chart
+    });
+    Some(charts.collect())
 }
 
 /// Figures 2, 11 and 14 to 17: the measures as they stood on the way, mean over the repetitions, a curve a row.

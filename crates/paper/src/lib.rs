@@ -2,6 +2,8 @@
 //! trained and measured by the [`Laboratory`], kept by the [`Store`], and set beside the paper's numbers by [`printed`] and [`stats`].
 
 pub mod figure;
+pub mod fold;
+pub mod hands;
 mod laboratory;
 pub mod plan;
 mod principal;
@@ -297,6 +299,9 @@ pub enum Error {
     /// The model file of a kept cell.
     #[error(transparent)]
     Model(#[from] trainer::model::Error),
+    /// A file of samples.
+    #[error(transparent)]
+    Data(#[from] trainer::data::Error),
     /// The folder of kept cells.
     #[error("cannot use {}: {source}", path.display())]
     Folder {
@@ -323,6 +328,7 @@ impl Remedy for Error {
             Self::Operator(error) => error.remedy(),
             Self::Training { source, .. } => source.remedy(),
             Self::Model(error) => error.remedy(),
+            Self::Data(error) => error.remedy(),
             Self::Folder { .. } => {
                 "check that the folder exists and that you may write there".to_owned()
             }

@@ -3,9 +3,7 @@
 use std::time::{Duration, Instant};
 
 use bridge::clutch::Position;
-
-use super::Run;
-use host::session::{Order, Orders};
+use host::session::{Order, Orders, Session};
 
 /// After this long the bridge has seen that the clutch was closed, on a line that loses most of what is said, too.
 const CLUTCH_SETTLES: Duration = Duration::from_secs(2);
@@ -42,57 +40,48 @@ impl Clutch {
             self.release_due = !orders.give(Order::Release);
         }
     }
-}
-
-impl Run {
-    /// Closes the clutch: an act of a person.
-    pub(super) fn engage(&mut self) {
+    /// Closes it: an act of a person.
+    pub fn engage(&mut self, session: &dyn Session) {
         let now = Some(Instant::now());
-        self.clutch = Clutch {
+        *self = Self {
             closed: true,
             engaged: now,
             heartbeat: now,
-            late_before: self.session.orders().too_late(),
-            ..Clutch::default()
+            late_before: session.orders().too_late(),
+            ..Self::default()
         };
-        if !self.session.order(Order::Engage) {
+        if !session.order(Order::Engage) {
             // It would be too old once there is room.
-            (self.clutch.closed, self.clutch.too_late) = (false, true);
+            (self.closed, self.too_late) = (false, true);
         }
     }
 
-    /// Opens the clutch, for a person.
-    pub(super) fn release(&mut self) {
-        let clutch = &mut self.clutch;
-        (clutch.closed, clutch.expired, clutch.too_late) = (false, false, false);
-        clutch.release_due = true;
-        clutch.give_release(self.session.orders());
+    /// Opens it, for a person.
+    pub fn release(&mut self, orders: &Orders) {
+        (self.closed, self.expired, self.too_late) = (false, false, false);
+        self.release_due = true;
+        self.give_release(orders);
     }
 
-    /// Sees that the clutch opened by itself, or that somebody else opened it, which is an act.
-    pub(super) fn look_at_clutch(&mut self) {
-        let clutch = &mut self.clutch;
-        let (true, Some(seen)) = (clutch.closed, self.session.snapshot()) else {
+    /// Sees that it opened by itself, or that somebody else opened it, which is an act.
+    pub fn look(&mut self, session: &dyn Session) {
+        let (true, Some(seen)) = (self.closed, session.snapshot()) else {
             return;
         };
-        if !clutch.seen_closed && self.session.orders().too_late() != clutch.late_before {
-            (clutch.closed, clutch.too_late) = (false, true);
+        if !self.seen_closed && session.orders().too_late() != self.late_before {
+            (self.closed, self.too_late) = (false, true);
             return;
         }
         match seen.clutch {
-            Position::Closed | Position::Lost => clutch.seen_closed = true,
-            Position::Open if clutch.seen_closed => clutch.closed = false,
-            Position::Expired if clutch.seen_closed => {
-                (clutch.closed, clutch.expired) = (false, true);
-            }
+            Position::Closed | Position::Lost => self.seen_closed = true,
+            Position::Open if self.seen_closed => self.closed = false,
+            Position::Expired if self.seen_closed => (self.closed, self.expired) = (false, true),
             // It was closed and opened between two looks, or never: what is said of it since is what is so.
             Position::Open | Position::Expired => {
-                let settled = clutch
-                    .engaged
-                    .is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
+                let settled = (self.engaged).is_some_and(|at| at.elapsed() > CLUTCH_SETTLES);
                 if settled {
-                    clutch.closed = false;
-                    clutch.expired = seen.clutch == Position::Expired;
+                    self.closed = false;
+                    self.expired = seen.clutch == Position::Expired;
                 }
             }
         }

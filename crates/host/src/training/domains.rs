@@ -65,7 +65,7 @@ pub fn samples(file: &Path, prefix: &str, reporter: &dyn Reporter) -> Result<Mat
 ///
 /// # Errors
 /// A failure that names the file and what is wrong with it.
-pub fn pairs(file: &Path, reporter: &dyn Reporter) -> Result<Pairs> {
+fn pairs(file: &Path, reporter: &dyn Reporter) -> Result<Pairs> {
     let mut table = Table::open(file, Columns::Numbered(&["q", "x"])).map_err(told)?;
     let pairs = Pairs {
         inputs: table.samples("q").map_err(told)?,
@@ -73,6 +73,30 @@ pub fn pairs(file: &Path, reporter: &dyn Reporter) -> Result<Pairs> {
     };
     tell_notes(file, &table, reporter);
     Ok(pairs)
+}
+
+/// The true pairs of a file whose inputs are among the samples `inputs`, or all of them, for targets of so many columns.
+///
+/// # Errors
+/// A failure that names the file and what is wrong with it.
+pub fn true_pairs(
+    file: &Path,
+    (inputs, target_columns): (&Matrix, usize),
+    reporter: &dyn Reporter,
+) -> Result<Pairs> {
+    let truth = pairs(file, reporter)?;
+    let found = [truth.inputs.cols, truth.targets.cols];
+    if found != [inputs.cols, target_columns] {
+        let what = format!(
+            "{}: pairs of {} and {} values, the model maps {} to {target_columns}",
+            file.display(),
+            found[0],
+            found[1],
+            inputs.cols
+        );
+        return Err(Failure::new(what, "true pairs of the same two domains").into());
+    }
+    Ok(matching(&truth, inputs))
 }
 
 /// A file of samples with what was read from it.
@@ -268,7 +292,7 @@ fn first_outside(pairs: &Matrix, samples: &Matrix) -> Option<(usize, usize, f32,
 }
 
 /// The pairs whose inputs are among these samples; all of them when none is.
-pub fn matching(pairs: &Pairs, samples: &Matrix) -> Pairs {
+fn matching(pairs: &Pairs, samples: &Matrix) -> Pairs {
     let bits = |row: &[f32]| -> Vec<u32> { row.iter().map(|value| value.to_bits()).collect() };
     let known: std::collections::HashSet<Vec<u32>> = samples.iter_rows().map(bits).collect();
     let chosen: Vec<usize> = (0..pairs.inputs.rows)

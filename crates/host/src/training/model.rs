@@ -7,13 +7,14 @@ use glove::hand::JOINT_COUNT;
 use hae::image::{ALIGNMENT, Checked, JointOrder, Meta, Parameters};
 use hae::quantized;
 use serde::Serialize;
-use trainer::data::Matrix;
+use trainer::data::{Matrix, sha256};
 use trainer::hand::Space;
 use trainer::model::{Model, has_digest};
 
 use crate::failure::{Failure, OrFail, told};
 use crate::report::Reporter;
 use crate::training::motion::Motion;
+use crate::training::task::sorted;
 
 /// Longest file that is looked at: a weights image has some 40 KB, a model some 500 KB.
 const LONGEST_FILE: u64 = 64 << 20;
@@ -139,6 +140,15 @@ pub fn load(path: &Path, reporter: &dyn Reporter) -> Result<Model> {
 /// A failure that names the file and what is wrong with it.
 pub fn load_any(path: &Path, reporter: &dyn Reporter) -> Result<Model> {
     parsed(&trainer::model::read(path).map_err(told)?, path, reporter)
+}
+
+/// Whether samples did not train `model`; `None` when the model does not say.
+pub fn held_out(model: &Model, samples: &Matrix) -> Option<bool> {
+    let whole = model.metadata.get("input_sha256")?;
+    let training = model.metadata.get("training_sha256")?;
+    let is_file = *whole == sha256(&[samples]);
+    let is_training_part = *training == sha256(&[&sorted(samples)]);
+    Some(!is_file && !is_training_part)
 }
 
 fn parsed(bytes: &[u8], path: &Path, reporter: &dyn Reporter) -> Result<Model> {

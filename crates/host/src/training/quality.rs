@@ -7,6 +7,7 @@ use trainer::measures::{Coverage, Test, measure, occupancy};
 use trainer::model::{Model, Normalisation};
 use trainer::spread::spread;
 
+use crate::next::Warning;
 use crate::stats::{number, number_or_null};
 
 /// What a map must reach to be worth driving a gripper with.
@@ -125,6 +126,13 @@ impl Quality {
         ))
     }
 
+    /// The same with what helps.
+    pub fn unfit(&self) -> Option<Warning> {
+        let next = "training longer (--schedule, --epochs), with another --seed, or on a recording in which every finger moves over its \
+                    whole range, alone and together";
+        Some(Warning::new(self.fault()?, next))
+    }
+
     /// In one line.
     pub fn line(&self) -> String {
         format!(
@@ -183,6 +191,19 @@ impl Measured {
                 .map_or(Coverage::Unknown, Coverage::Epsilon),
         };
         Self::of(model, (&spread, targets), &coverage, None, measured_on)
+    }
+
+    /// What true pairs say of a map that neighbours alone may not show to be folded: right maps have an NMSE below about .1, folded or
+    /// turned ones about 1.
+    pub fn far_from_truth(&self) -> Option<Warning> {
+        const FAR: f64 = 0.5;
+        let nmse = self.nmse.filter(|nmse| *nmse > FAR)?;
+        Some(Warning::new(
+            format!(
+                "the map folds or is turned: NMSE {nmse:.2} over true pairs (right maps: below 0.1)"
+            ),
+            "training with another --seed, one more of --pairs, or --schedule paper",
+        ))
     }
 
     /// Measures `model` on input samples against target samples, with what `coverage` says of the target domain, all in the domains'

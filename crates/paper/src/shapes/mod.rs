@@ -5,6 +5,7 @@
 //! out exactly. Distances along an outline are measured on the surface. Everything of a pair is twice the size of the box [−1, 1]².
 
 pub mod curve;
+pub mod files;
 pub mod harmonic;
 pub mod mesh;
 mod pair;

@@ -1,24 +1,19 @@
-//! Runs of a bridge on a chip: calibrated, engaged, watched, recorded.
+//! Runs of a bridge on a chip, and the one in which it is engaged.
 
-use std::path::Path;
 use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
 use anyhow::Result;
-use bridge::calibration::{Refusal, Try};
-use bridge::protocol::message::{Health, Sample};
+use bridge::protocol::message::Sample;
 
 use super::args::BridgeAt;
-use super::poses::Poses;
-use crate::outputs;
-use crate::results::{self, devices, runs};
+use crate::results::{self, runs};
 use crate::run::{Finished, Options, Run};
 use crate::tell::Tell;
 use host::chip::link::HostLink;
 use host::clock::Clock;
-use host::failure::{Failure, with_others};
 use host::interrupt::Interrupt;
-use host::session::{Devices, OnChip, refused};
+use host::session::{Devices, OnChip};
 
 pub(super) fn engage(
     at: &BridgeAt,
@@ -65,7 +60,7 @@ pub(crate) fn start(
     Ok(Run::new(session, None, clock, interrupt.clone(), devices))
 }
 
-fn drive(
+pub(super) fn drive(
     run: &mut Run,
     title: &'static str,
     seconds: Option<Duration>,
@@ -82,87 +77,8 @@ fn drive(
     run.drive(&options).map(drop)
 }
 
-pub(super) fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
-    let tell = Tell::new(at.json);
-    let mut link = at.connect()?;
-    if undo {
-        at.told(link.undo_calibration())?;
-        let health = at.told(link.health())?;
-        if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
-            return Err(refused(why, &at.devices()).into());
-        }
-        tell.say(format_args!("the newest calibration was taken back"));
-        if at.json {
-            return results::print("bridge calibrate", devices::Calibrated { health: &health });
-        }
-        return Ok(());
-    }
-    // An older bridge is refused by name.
-    let health = at.told(link.health())?;
-    let mut run = start(link, None, at.devices(), interrupt)?;
-    let taken = run.calibrate(&tell).and_then(|taken| match taken {
-        true => Ok(()),
-        false => Err(Failure::interrupted("before the hand was taken").into()),
-    });
-    let now = run.snapshot().map(|seen| seen.calibration);
-    run.finish().judge_prepared(taken)?;
-    if at.json {
-        let calibration = now.unwrap_or(health.calibration);
-        let health = Health {
-            calibration,
-            ..health
-        };
-        return results::print("bridge calibrate", devices::Calibrated { health: &health });
-    }
-    Ok(())
-}
-
-pub(super) fn monitor(
-    at: &BridgeAt,
-    seconds: Option<Duration>,
-    interrupt: &Interrupt,
-) -> Result<()> {
-    let mut run = start(at.connect()?, None, at.devices(), interrupt)?;
-    let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
-    finish("bridge monitor", at, run.finish(), (None, Ok(())), driven)
-}
-
-pub(super) fn log(
-    at: &BridgeAt,
-    path: &Path,
-    seconds: Option<Duration>,
-    interrupt: &Interrupt,
-) -> Result<()> {
-    let tell = Tell::new(at.json);
-    outputs::check_new(path)?;
-    let link = at.connect()?;
-    let (poses, samples) = Poses::create(path, interrupt)?;
-    let driven = start(link, Some(samples), at.devices(), interrupt).map(|mut run| {
-        let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
-        (run.finish(), driven)
-    });
-    let (rows, written) = poses.finish();
-    let (finished, driven) = match (driven, &written) {
-        (Ok(done), _) => done,
-        (Err(first), Err(other)) => return Err(with_others(first, vec![format!("{other:#}")])),
-        (Err(first), Ok(())) => return Err(first),
-    };
-    match rows {
-        0 => tell.say(format_args!(
-            "log        none: no pose came, so that no file was left"
-        )),
-        rows => tell.say(format_args!(
-            "log        {} with {rows} poses",
-            path.display()
-        )),
-    }
-    // A file without a row is not there.
-    let poses = (rows > 0).then_some(runs::Poses { path, rows });
-    finish("bridge log", at, finished, (poses, written), driven)
-}
-
 /// The numbers, then the judgement over all of it.
-fn finish(
+pub(super) fn finish(
     verb: &'static str,
     at: &BridgeAt,
     mut finished: Finished,

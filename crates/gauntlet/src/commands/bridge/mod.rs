@@ -1,9 +1,11 @@
 //! `gauntlet bridge`: a bridge on a chip, asked, watched and told over the host protocol.
 
 mod args;
+mod calibrate;
 mod drive;
 mod poses;
 mod status;
+mod watch;
 
 use std::time::{Duration, Instant};
 
@@ -35,10 +37,10 @@ pub(crate) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
             activate,
             seconds,
         } => drive::engage(at, *calibrate_flat, *activate, *seconds, interrupt),
-        BridgeVerb::Calibrate { at, undo } => drive::calibrate(at, *undo, interrupt),
+        BridgeVerb::Calibrate { at, undo } => calibrate::calibrate(at, *undo, interrupt),
         BridgeVerb::Release { at } => release(at),
-        BridgeVerb::Monitor { at, seconds } => drive::monitor(at, *seconds, interrupt),
-        BridgeVerb::Log { at, out, seconds } => drive::log(at, out, *seconds, interrupt),
+        BridgeVerb::Monitor { at, seconds } => watch::monitor(at, *seconds, interrupt),
+        BridgeVerb::Log { at, out, seconds } => watch::log(at, out, *seconds, interrupt),
         BridgeVerb::Select { slot, at } => select(at, *slot),
         BridgeVerb::Reboot { at } => reboot(at),
     }

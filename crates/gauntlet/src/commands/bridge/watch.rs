@@ -1,0 +1,59 @@
+//! A bridge on a chip that is only watched, and its hand recorded.
+
+use std::path::Path;
+use std::time::Duration;
+
+use anyhow::Result;
+
+use super::args::BridgeAt;
+use super::drive::{drive, finish, start};
+use super::poses::Poses;
+use crate::outputs;
+use crate::results::runs;
+use crate::tell::Tell;
+use host::failure::with_others;
+use host::interrupt::Interrupt;
+
+pub(super) fn monitor(
+    at: &BridgeAt,
+    seconds: Option<Duration>,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let mut run = start(at.connect()?, None, at.devices(), interrupt)?;
+    let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
+    finish("bridge monitor", at, run.finish(), (None, Ok(())), driven)
+}
+
+pub(super) fn log(
+    at: &BridgeAt,
+    path: &Path,
+    seconds: Option<Duration>,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let tell = Tell::new(at.json);
+    outputs::check_new(path)?;
+    let link = at.connect()?;
+    let (poses, samples) = Poses::create(path, interrupt)?;
+    let driven = start(link, Some(samples), at.devices(), interrupt).map(|mut run| {
+        let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
+        (run.finish(), driven)
+    });
+    let (rows, written) = poses.finish();
+    let (finished, driven) = match (driven, &written) {
+        (Ok(done), _) => done,
+        (Err(first), Err(other)) => return Err(with_others(first, vec![format!("{other:#}")])),
+        (Err(first), Ok(())) => return Err(first),
+    };
+    match rows {
+        0 => tell.say(format_args!(
+            "log        none: no pose came, so that no file was left"
+        )),
+        rows => tell.say(format_args!(
+            "log        {} with {rows} poses",
+            path.display()
+        )),
+    }
+    // A file without a row is not there.
+    let poses = (rows > 0).then_some(runs::Poses { path, rows });
+    finish("bridge log", at, finished, (poses, written), driven)
+}

@@ -1,0 +1,97 @@
+//! The options of `simulate`.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Result;
+use clap::Args;
+
+use crate::options::model_parser;
+use host::failure::Failure;
+use host::lines::Model;
+
+/// Where the devices are linked when no path is given.
+const GLOVE: &str = "/tmp/glove";
+const GRIPPER: &str = "/tmp/gripper";
+
+/// Options of `simulate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet simulate                                                  both, at /tmp/glove and /tmp/gripper
+  gauntlet simulate --glove /tmp/glove --poses my_hand.csv
+  gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
+  gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
+
+Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
+ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
+takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
+The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
+Enter lays it flat at any time, and Enter again lets it move. \
+Runs until interrupted (Ctrl-C) and takes the links away.")]
+pub struct Simulate {
+    /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
+    #[arg(long, value_name = "PATH")]
+    pub glove: Option<PathBuf>,
+    /// Link the virtual gripper here, or let it listen at tcp:HOST:PORT.
+    #[arg(long, value_name = "PATH")]
+    pub gripper: Option<PathBuf>,
+    /// Which gripper it is; the 3-Finger if not said.
+    #[arg(long, value_name = "MODEL", value_parser = model_parser())]
+    pub gripper_model: Option<Model>,
+    /// The glove plays this recording of a hand instead of generated motion.
+    #[arg(long, value_name = "FILE.csv")]
+    pub poses: Option<PathBuf>,
+    /// Seed of the generated motion.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub seed: u64,
+}
+
+impl Simulate {
+    /// Where to make the glove and the gripper: what was said, or both at their default places.
+    pub(super) fn places(&self) -> Result<[Option<&Path>; 2]> {
+        let unused = |option: &str, device: &str| {
+            let what = format!("{option} is of no use without a {device}");
+            let next = format!("add --{device} PATH, or leave both paths out to make both devices");
+            Err(Failure::usage(what, next).into())
+        };
+        match (self.glove.as_deref(), self.gripper.as_deref()) {
+            (None, None) => Ok([Some(Path::new(GLOVE)), Some(Path::new(GRIPPER))]),
+            (None, _) if self.poses.is_some() => unused("--poses", "glove"),
+            (_, None) if self.gripper_model.is_some() => unused("--gripper-model", "gripper"),
+            (glove, gripper) => Ok([glove, gripper]),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn options(glove: Option<&str>, gripper: Option<&str>) -> Simulate {
+        Simulate {
+            glove: glove.map(PathBuf::from),
+            gripper: gripper.map(PathBuf::from),
+            gripper_model: None,
+            poses: None,
+            seed: 1,
+        }
+    }
+
+    #[test]
+    fn without_a_path_both_devices_are_made_and_with_one_that_device_alone() {
+        let paths = |glove, gripper| {
+            let options = options(glove, gripper);
+            options
+                .places()
+                .map(|places| places.map(|place| place.map(Path::to_owned)))
+        };
+        let some = |path: &str| Some(PathBuf::from(path));
+        assert_eq!(
+            paths(None, None).unwrap(),
+            [some("/tmp/glove"), some("/tmp/gripper")]
+        );
+        assert_eq!(paths(Some("a"), None).unwrap(), [some("a"), None]);
+        assert_eq!(paths(None, Some("b")).unwrap(), [None, some("b")]);
+    }
+}
