@@ -1,7 +1,6 @@
 //! `reproduce` with trainings of two epochs.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::Path;
 use std::process::Stdio;
