@@ -412,10 +412,10 @@ fn results_of_the_paper_keep_their_names() {
         target: vec![0.0, 255.0, 0.0, 137.0],
         like: "basic open",
     };
-    let made = |what: &str, result| paper::Made {
+    let made = |what: &str, numbers| paper::Made {
         what: what.to_owned(),
         files: vec![format!("reproduction/{what}.csv")],
-        result,
+        numbers,
     };
     let reproduced = paper::Reproduced {
         folder: path("reproduction"),

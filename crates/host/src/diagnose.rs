@@ -7,6 +7,7 @@ mod answer;
 mod cure;
 mod glove;
 mod gripper;
+mod late;
 mod network;
 mod place;
 mod raw;
@@ -95,6 +96,13 @@ impl Findings {
         self.0
             .iter()
             .find(|finding| finding.verdict == Verdict::Wrong)
+    }
+
+    /// That, as a failure that begins with `what`.
+    pub fn as_failure(&self, what: &str) -> Option<Failure> {
+        let wrong = self.first_wrong()?;
+        let next = wrong.next.clone().unwrap_or_default();
+        Some(Failure::new(format!("{what}: {}", wrong.what), next))
     }
 
     /// How many things are wrong.

@@ -99,24 +99,20 @@ pub fn lost_sensors(health: &[Health; hand::SEGMENT_COUNT]) -> Option<String> {
 
 /// The sensors that are not used although they give orientations, by name. `distrusted`: bit k is segment k.
 pub fn distrusted_sensors(distrusted: u16) -> Option<String> {
-    let names = names_of(distrusted);
-    (!names.is_empty()).then(|| {
-        format!(
-            "sensor {} jumped or restarted: its joints are held until the next calibration",
-            names.join(", ")
-        )
-    })
+    let what = "jumped or restarted: its joints are held until the next calibration";
+    sensors_that(distrusted, what)
 }
 
 /// The sensors that show what no hand does, by name. `impossible`: bit k is segment k.
 pub fn impossible_sensors(impossible: u16) -> Option<String> {
-    let names = names_of(impossible);
-    (!names.is_empty()).then(|| {
-        format!(
-            "sensor {} shows a joint turned farther than a hand's can be: its joints are held as long as it does",
-            names.join(", ")
-        )
-    })
+    let what =
+        "shows a joint turned farther than a hand's can be: its joints are held as long as it does";
+    sensors_that(impossible, what)
+}
+
+fn sensors_that(bits: u16, what: &str) -> Option<String> {
+    let names = names_of(bits);
+    (!names.is_empty()).then(|| format!("sensor {} {what}", names.join(", ")))
 }
 
 /// Why a file is not written.

@@ -84,6 +84,21 @@ pub struct Network<T = f32> {
     pub b2: Vec<T>,
 }
 
+impl Network<f32> {
+    /// As the weights image takes them.
+    pub fn parameters(&self) -> hae::image::Parameters<'_> {
+        hae::image::Parameters {
+            inputs: self.inputs,
+            hidden: self.hidden,
+            outputs: self.outputs,
+            w1: &self.w1,
+            b1: &self.b1,
+            w2: &self.w2,
+            b2: &self.b2,
+        }
+    }
+}
+
 impl<T: Real> Network<T> {
     /// A network of zeros.
     #[must_use]

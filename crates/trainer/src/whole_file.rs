@@ -3,6 +3,51 @@
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
+use crate::remedy::Remedy;
+
+/// What the system refused to do with a file.
+#[derive(Debug, thiserror::Error)]
+pub enum Error {
+    /// It cannot be opened or read.
+    #[error("cannot read {}: {source}", file.display())]
+    Read {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// It cannot be written.
+    #[error("cannot write {}: {source}", file.display())]
+    Write {
+        /// The file.
+        file: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+impl Error {
+    pub(crate) fn reading(file: &Path, source: std::io::Error) -> Self {
+        let file = file.to_owned();
+        Self::Read { file, source }
+    }
+
+    pub(crate) fn writing(file: &Path, source: std::io::Error) -> Self {
+        let file = file.to_owned();
+        Self::Write { file, source }
+    }
+}
+
+impl Remedy for Error {
+    fn remedy(&self) -> String {
+        let next = match self {
+            Self::Read { .. } => "check the path and that you may read it",
+            Self::Write { .. } => "check that the folder exists and that you may write there",
+        };
+        next.to_owned()
+    }
+}
+
 /// Writes `bytes` to `path`. A reader, or a person after a power cut, sees the old file or the new one, never a half.
 ///
 /// # Errors

@@ -28,7 +28,7 @@ pub struct Made {
     /// Its files.
     pub files: Vec<String>,
     /// What is in it, where numbers say it; else `null`.
-    pub result: Option<Numbers>,
+    pub numbers: Option<Numbers>,
 }
 
 /// The numbers of a table or a figure.

@@ -1,10 +1,8 @@
 //! Lines and servers that spoil answers: `doctor` tells each as what it is, with a next step that can be pasted, and ends
 //! by itself whatever comes.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-#[path = "support/pasted.rs"]
-mod pasted;
-mod support;
+use crate::pasted;
+use crate::support;
 
 use std::collections::VecDeque;
 use std::sync::Arc;

@@ -1,7 +1,6 @@
 //! `gauntlet gripper` as a person runs it, against virtual devices.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::process::Output;
 

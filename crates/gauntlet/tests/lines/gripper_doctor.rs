@@ -1,9 +1,7 @@
 //! `gauntlet doctor`: every layer that can fail is named, with what to do about it.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-#[path = "support/pasted.rs"]
-mod pasted;
-mod support;
+use crate::pasted;
+use crate::support;
 
 use std::collections::VecDeque;
 use std::io::{Read, Write};

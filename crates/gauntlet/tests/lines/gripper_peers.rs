@@ -2,9 +2,8 @@
 //!
 //! Where one of them is not there the test is skipped; `cargo xtask setup` gets them, and `cargo xtask test` names the Python
 //! that has the two packages in `GAUNTLET_PEERS_PYTHON`.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

@@ -1,6 +1,5 @@
 //! Modbus TCP: our line against scripted servers, tokio-modbus' server and the virtual gripper; tokio-modbus' client and
 //! the manuals' bytes against the virtual gripper.
-#![allow(missing_docs, clippy::unwrap_used)]
 
 use std::future::{Ready, ready};
 use std::io::{Read, Write};

@@ -1,7 +1,6 @@
 //! `train` and `eval` on samples of any two domains.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use support::samples::{Files, pairs};
 use support::told::interrupted_at;

@@ -1,7 +1,6 @@
 //! What is wrong with the samples of two domains, their pairs and their checkpoints: one clear line, and no model.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use support::samples::{Files, pairs, targets};
 use support::{refusal, run, text};

@@ -1,7 +1,6 @@
 //! `export`: weights images of both kinds, and what takes them.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::{Path, PathBuf};
 

@@ -1,7 +1,6 @@
 //! `reproduce` with trainings of two epochs.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::Path;
 use std::process::Stdio;
@@ -36,13 +35,13 @@ fn figures_come_with_their_data_and_a_training_serves_them_all() {
             assert!(is_whole, "{file}");
         }
     }
-    let shapes = results[0]["result"].as_array().unwrap();
+    let shapes = results[0]["numbers"].as_array().unwrap();
     let nodes: Vec<u64> = shapes
         .iter()
         .map(|s| s["nodes"].as_u64().unwrap())
         .collect();
     assert_eq!(nodes, [1409, 952, 1709, 2209]);
-    assert_eq!(results[1]["result"].as_array().unwrap().len(), 8);
+    assert_eq!(results[1]["numbers"].as_array().unwrap().len(), 8);
     let trajectory = std::fs::read_to_string(folder.path().join("fig12.csv")).unwrap();
     assert_eq!(trajectory.lines().count(), 1 + 25);
     assert!(trajectory.starts_with("pose,time_s,thumb_cmc_flex"));
@@ -142,7 +141,7 @@ fn a_table_holds_the_orders_and_dashes_and_replaces_an_old_one_whole() {
         !written.contains("← outside") || written.contains("this run has less"),
         "{written}"
     );
-    let result = &said["results"][0]["result"][0];
+    let result = &said["results"][0]["numbers"][0];
     assert_eq!(result["rows"].as_array().unwrap().len(), 7);
     assert_eq!(result["orders"].as_array().unwrap().len(), 2);
 }

@@ -1,7 +1,6 @@
 //! `train` and `eval` on small data.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::process::Stdio;
 use std::time::{Duration, Instant};

@@ -1,7 +1,6 @@
 //! Wrong files and wrong words: one clear line, a next step, exit code 1 or 2.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::Path;
 use support::{JOINTS, model, poses_file, poses_text, refusal, run, text};

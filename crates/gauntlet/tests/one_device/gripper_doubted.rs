@@ -1,8 +1,7 @@
 //! `gauntlet gripper` with a gripper that says what is not so, stands although told to move, reports faults, answers late
 //! or not at all; and in a process that stands still.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::process::{Child, Output};
 use std::time::{Duration, Instant};

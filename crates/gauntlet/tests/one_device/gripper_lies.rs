@@ -1,7 +1,6 @@
 //! `gauntlet gripper move` with a gripper whose positions, echoes and flags lie, and in a process that is stopped.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::process::{Child, Output};
 use std::time::{Duration, Instant};

@@ -1,7 +1,6 @@
 //! `simulate`'s other grippers, on a terminal and on the network, and a glove that drives the one on the network.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use support::{
     Simulation, finish, interrupt, json, model, refusal, run, start, text, until_line, wait,

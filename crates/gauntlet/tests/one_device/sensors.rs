@@ -1,7 +1,6 @@
 //! What `teleop` says of sensors that do not come up: the same as `doctor`.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use support::devices::{glove, gripper};
 use support::{model, run, text};

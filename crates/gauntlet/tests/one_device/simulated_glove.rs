@@ -1,7 +1,6 @@
 //! The glove that `simulate` makes, as a program finds it: its sensors answer, and its hand lies flat when the port is opened.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::Path;
 use std::time::{Duration, Instant};

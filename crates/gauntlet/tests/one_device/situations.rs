@@ -11,14 +11,12 @@
 //! | a process that stands still in a move | `gripper_doubted`: `a_process_that_stood_still_asks_where_the_gripper_is_before_it_commands` |
 //! | a disk that is full under the log | `ends_judged`: `a_log_that_can_grow_no_more_is_told_while_the_run_goes_on_and_stays_readable` |
 //! | models that are none, are cut short or have a flipped bit; tables as other programs write them; outputs that cannot be written | `wrong_files`, `domains`, `domains_refused`, `training`, `export` |
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixListener;
 use std::process::Output;
-use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use bridge::protocol::frame::{self, Decoder};
@@ -27,10 +25,9 @@ use bridge::protocol::message::{
 };
 use rig::Device;
 use rig::gripper::{Config, Family, VirtualGripper};
-use rustix::process::{Pid, Signal, kill_process};
 use support::devices::behind_pty;
 use support::lines::{Pieces, Shaped, at_once};
-use support::told::Told;
+use support::other_master::{command, noted};
 use support::{Simulation, interrupt, model, run, start, text, until_line, wait};
 
 fn ready(family: Family) -> VirtualGripper {
@@ -109,15 +106,6 @@ fn an_object_in_the_way_ends_the_move_and_is_told_and_nothing_is_asked_far_beyon
         let asked = gripper.command_block()[3];
         assert!(asked <= 131, "{family:?}: asked for {asked}");
     }
-}
-
-/// A write of these command bytes, as another master sends it.
-fn command(block: &[u8]) -> Vec<u8> {
-    let registers = u8::try_from(block.len() / 2).unwrap();
-    let mut frame = vec![9, 0x10, 0x03, 0xE8, 0, registers, 2 * registers];
-    frame.extend(block);
-    frame.extend(gripper::rtu::crc16(&frame).to_le_bytes());
-    frame
 }
 
 #[test]
@@ -200,153 +188,6 @@ fn a_reader_that_leaves_ends_the_program_in_order() {
         .unwrap();
     assert!(matches!(code, Some(0)), "{code:?}: {said}");
     assert!(!said.contains("panicked"), "{said}");
-}
-
-/// The commands a gripper took, and its true positions then.
-type Notes = Arc<Mutex<Vec<([u8; 16], [f32; 4])>>>;
-/// What another master says, once.
-type Word = Arc<Mutex<Option<Vec<u8>>>>;
-
-fn noted(gripper: &VirtualGripper) -> (Noted, Notes, Word) {
-    let (notes, word) = (Notes::default(), Word::default());
-    let noted = Noted {
-        gripper: gripper.clone(),
-        notes: Arc::clone(&notes),
-        word: Arc::clone(&word),
-        of_other: 0,
-    };
-    (noted, notes, word)
-}
-
-/// Bytes that answer a write of registers.
-const ANSWER_TO_WRITE: usize = 8;
-
-/// A gripper that notes where it was told to go and where it was then; another master can put in a word.
-struct Noted {
-    gripper: VirtualGripper,
-    notes: Notes,
-    word: Word,
-    /// Bytes still to come that answer the other master.
-    of_other: usize,
-}
-
-impl Device for Noted {
-    fn receive(&mut self, bytes: &[u8], now: rig::Instant) {
-        let writes = self.gripper.writes();
-        self.gripper.receive(bytes, now);
-        self.note(writes);
-    }
-
-    fn transmit(&mut self, now: rig::Instant, out: &mut [u8]) -> usize {
-        if let Some(word) = self.word.lock().unwrap().take() {
-            self.gripper.receive(&word, now);
-            self.of_other = ANSWER_TO_WRITE;
-        }
-        let writes = self.gripper.writes();
-        let count = self.gripper.transmit(now, out);
-        if self.of_other == 0 {
-            self.note(writes);
-        }
-        // The other master's answer is not for this line.
-        let dropped = self.of_other.min(count);
-        self.of_other -= dropped;
-        out.copy_within(dropped..count, 0);
-        count - dropped
-    }
-
-    fn next_due(&self) -> Option<rig::Instant> {
-        // The other master speaks at once.
-        let word = self.word.lock().unwrap().is_some();
-        let at_once = word.then(|| rig::Instant::from_ticks(0));
-        at_once.or_else(|| self.gripper.next_due())
-    }
-
-    fn baud(&self) -> u32 {
-        self.gripper.baud()
-    }
-}
-
-impl Noted {
-    fn note(&self, writes: u64) {
-        if self.gripper.writes() > writes {
-            let note = (self.gripper.command_block(), self.gripper.positions());
-            self.notes.lock().unwrap().push(note);
-        }
-    }
-}
-
-/// Counts by which somebody else moves the gripper while the tool stands still.
-const ELSEWHERE: f32 = 16.0;
-
-#[test]
-fn the_first_command_after_a_stall_is_where_the_gripper_is() {
-    let simulation = Simulation::start(true, false);
-    let gripper = ready(Family::ThreeFinger);
-    let (noted, notes, word) = noted(&gripper);
-    let (handle, path) = behind_pty(noted);
-    let (glove, model) = (simulation.glove(), model().to_str().unwrap());
-    let mut teleop = start(&[
-        "teleop",
-        "--glove",
-        &glove,
-        "--gripper",
-        &path,
-        "--model",
-        model,
-        "--engage",
-        "--calibrate-flat",
-        "--seconds",
-        "120",
-    ]);
-    let said = Told::by(teleop.stdout.take().unwrap());
-    let mut seen = said.until(0, "following");
-    let id = Pid::from_raw(i32::try_from(teleop.id()).unwrap()).unwrap();
-    let (mut commands, mut moved) = (0, 0.0);
-    for stall in 0..4_u64 {
-        // It goes on; the stop comes at another place of its cycle each time.
-        seen = said.until(seen, "finger A");
-        std::thread::sleep(Duration::from_millis(500 + 7 * stall));
-        kill_process(id, Signal::STOP).unwrap();
-        std::thread::sleep(Duration::from_millis(60));
-        // Meanwhile somebody else sends it elsewhere: not so far that a person would have to close the clutch again.
-        let mut block = gripper.command_block();
-        for (axis, at) in [3, 6, 9].into_iter().enumerate() {
-            let here = gripper.positions()[axis];
-            let there = if here < 128.0 {
-                here + ELSEWHERE
-            } else {
-                here - ELSEWHERE
-            };
-            block[at] = there as u8;
-        }
-        *word.lock().unwrap() = Some(command(&block));
-        let before = gripper.positions();
-        std::thread::sleep(Duration::from_millis(700));
-        gripper.run_until(handle.clock().now());
-        moved += f32::abs(gripper.positions()[0] - before[0]);
-        notes.lock().unwrap().clear();
-        kill_process(id, Signal::CONT).unwrap();
-        std::thread::sleep(Duration::from_millis(500));
-        let Some((block, at)) = notes.lock().unwrap().first().copied() else {
-            continue;
-        };
-        commands += 1;
-        let told = [block[3], block[6], block[9]];
-        let off = told
-            .iter()
-            .zip(at)
-            .map(|(told, at)| (f32::from(*told) - at).abs());
-        let off = off.fold(0.0, f32::max);
-        assert!(off <= 8.0, "stall {stall}: told {told:?} at {at:?}");
-    }
-    interrupt(&teleop);
-    wait(&mut teleop);
-    assert!(
-        moved > 2.0 * ELSEWHERE,
-        "nobody moved the gripper meanwhile: {moved}"
-    );
-    assert!(commands > 0, "no command came after any of the stalls");
-    said.all();
 }
 
 /// Answers a flash as a bridge does; `before` is put in front of reply number n.

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant, UNIX_EPOCH};
 pub mod bench;
 pub mod devices;
 pub mod lines;
+pub mod other_master;
 pub mod samples;
 pub mod terminal;
 pub mod told;
@@ -165,6 +166,18 @@ fn train_model(kept: &Path) {
     ]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     std::fs::rename(model, kept).unwrap();
+}
+
+/// The words of `teleop` with the test's model.
+pub fn teleop(glove: &str, gripper: &str, more: &[&str]) -> Vec<String> {
+    let mut arguments = vec!["teleop", "--glove", glove, "--gripper", gripper, "--model"];
+    arguments.push(model().to_str().unwrap());
+    arguments.extend(more);
+    arguments.into_iter().map(str::to_owned).collect()
+}
+
+pub fn run_owned(arguments: &[String]) -> Output {
+    run(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
 }
 
 /// Reads lines until one contains `word`; the rest is read by a thread, so that the child never waits for its reader.

@@ -1,10 +1,7 @@
 //! How a watch of a bridge on a chip is judged at its end. Skipped, with a word, where QEMU or the firmware is missing.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-#[path = "../../../tests/src/debugger.rs"]
-#[allow(dead_code)]
-mod debugger;
-mod support;
+use crate::debugger;
+use crate::support;
 
 use std::path::PathBuf;
 use std::process::{Output, Stdio};

@@ -1,7 +1,6 @@
 //! The whole demo, shortened: trains, starts both devices, drives one with the other, sums up.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use support::{json, refusal, run};
 

@@ -1,7 +1,6 @@
 //! What a run that has ended says of itself: its log, its exit code, and what was broken.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

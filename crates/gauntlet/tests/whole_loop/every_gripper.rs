@@ -1,8 +1,7 @@
 //! Every gripper follows the hand, through the tool's own session: 2-Finger ones by a map of one output, the 3-Finger over
 //! Modbus TCP; and a map of another shape is refused with a next step.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::path::{Path, PathBuf};
 use std::process::Output;

@@ -1,6 +1,5 @@
 //! A fault of the program itself, whose signals are caught for the sake of those who send them.
 #![cfg(target_os = "linux")]
-#![allow(missing_docs, clippy::unwrap_used)]
 
 use std::os::unix::process::ExitStatusExt;
 use std::process::{Command, Output, Stdio};
@@ -43,7 +42,7 @@ fn child() {
 
 fn ends(fault: &str) -> Output {
     let mut child = Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "child", "--nocapture"])
+        .args(["--exact", "own_faults::child", "--nocapture"])
         .env(FAULT, fault)
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())

@@ -1,7 +1,6 @@
 //! What the view says while it is so, on a terminal with a person's keys.
-#![allow(missing_docs, clippy::unwrap_used)]
 
-mod support;
+use crate::support;
 
 use std::time::{Duration, Instant};
 

@@ -70,16 +70,12 @@ pub fn missing_sensors(health: &[Health; SEGMENT_COUNT]) -> Findings {
 /// `what`.
 pub fn no_sensors(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
     let findings = glove(path, interrupt);
-    match findings.first_wrong() {
-        Some(wrong) => Failure::new(
-            format!("{what}: {}", wrong.what),
-            wrong.next.clone().unwrap_or_default(),
-        ),
-        None => Failure::new(
+    findings.as_failure(what).unwrap_or_else(|| {
+        Failure::new(
             format!("{what} in time, though they do now"),
             "the same again",
-        ),
-    }
+        )
+    })
 }
 
 /// A register of the glove's serial bridge that does not keep what the driver writes into it: no sensor would answer.

@@ -41,16 +41,12 @@ pub fn no_gripper(what: &str, path: &Path, asked: Asked<'_>, interrupt: &Interru
     if interrupt.asked() {
         return Failure::interrupted("while the gripper was looked for");
     }
-    match findings.first_wrong() {
-        Some(wrong) => Failure::new(
-            format!("{what}: {}", wrong.what),
-            wrong.next.clone().unwrap_or_default(),
-        ),
-        None => Failure::new(
+    findings.as_failure(what).unwrap_or_else(|| {
+        Failure::new(
             format!("{what} in time, though it answers single questions"),
             place.command("doctor"),
-        ),
-    }
+        )
+    })
 }
 
 /// `thorough`: a gripper that does not answer is looked for at other speeds and under other units.

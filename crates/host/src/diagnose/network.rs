@@ -11,8 +11,7 @@ use gripper::registers::Kind;
 
 use super::raw::hex;
 use super::sampled::{interrupted, sample, says};
-use super::serial::enough;
-use super::{Findings, Place};
+use super::{Findings, Place, late};
 use crate::clock::Clock;
 use crate::interrupt::Interrupt;
 use crate::lines::Line;
@@ -200,21 +199,13 @@ impl Tally {
         if *worst <= patience {
             return None;
         }
-        let needed = enough(*worst);
-        let what = format!(
-            "answers come late: {} ms after the question, {} ms at most, where {} ms are waited for",
-            middle.as_millis(),
-            worst.as_millis(),
-            patience.as_millis()
-        );
-        let next = place.with_patience(needed).command("gripper status");
-        let next = next.then(" (teleop takes --patience too); a network without the delay");
-        if *middle <= patience {
-            findings.note("connection", what, next);
-            return None;
-        }
-        findings.wrong("connection", what, next);
-        Some(needed)
+        let without = "a network without the delay";
+        late::tell(
+            (place, "connection"),
+            (*middle, *worst),
+            ("", without),
+            findings,
+        )
     }
 }
 

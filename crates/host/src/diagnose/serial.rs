@@ -6,7 +6,7 @@ use gripper::timing;
 
 use super::answer::{Answer, Came, emit, holds_answer, judge, status_read};
 use super::raw::{Expect, ask, hex, listen, text};
-use super::{Findings, Place};
+use super::{Findings, Place, late};
 use crate::interrupt::Interrupt;
 use crate::lines::port::Port;
 
@@ -243,29 +243,10 @@ impl Tally {
         }
         let late = self.answers.iter().filter(|(_, late)| *late > patience);
         let (late, total) = (late.count(), self.answers.len());
-        let needed = enough(worst);
-        let what = format!(
-            "answers come late: {} ms after the question, {} ms at most, where {} ms are waited for ({late} of {total} too late)",
-            middle.as_millis(),
-            worst.as_millis(),
-            patience.as_millis()
-        );
-        let next = place.with_patience(needed).command("gripper status");
-        let next =
-            next.then(" (teleop takes --patience too); an adapter or a tunnel without the delay");
-        if middle <= patience {
-            findings.note("line", what, next);
-            return None;
-        }
-        findings.wrong("line", what, next);
-        Some(needed)
+        let more = format!(" ({late} of {total} too late)");
+        let without = "an adapter or a tunnel without the delay";
+        late::tell((place, "line"), (middle, worst), (&more, without), findings)
     }
-}
-
-/// A patience with which answers `worst` late are in time: half more, in tens of milliseconds.
-pub fn enough(worst: Duration) -> Duration {
-    let millis = u64::try_from(worst.as_millis()).unwrap_or(u64::MAX);
-    Duration::from_millis((millis.saturating_mul(3) / 20 + 1).saturating_mul(10))
 }
 
 /// What came, in words.
@@ -294,12 +275,6 @@ pub fn words(came: &Came) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_patience_advised_is_half_more_than_what_was_seen() {
-        let advised = |ms| enough(Duration::from_millis(ms)).as_millis();
-        assert_eq!([advised(30), advised(31), advised(200)], [50, 50, 310]);
-    }
 
     #[test]
     fn silence_is_what_came_only_where_nothing_else_did() {

@@ -52,6 +52,7 @@ pub struct Written {
     /// Records that did not fit the queue.
     pub lost: u64,
     /// Why it ends before the run does.
+    #[serde(rename = "error")]
     pub fault: Option<String>,
 }
 

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use glove::hand::JOINT_COUNT;
-use hae::image::{ALIGNMENT, Checked, JointOrder, Meta, Parameters};
+use hae::image::{ALIGNMENT, Checked, JointOrder, Meta};
 use hae::quantized;
 use serde::Serialize;
 use trainer::data::{Matrix, sha256};
@@ -203,15 +203,7 @@ pub fn image(model: &Model) -> Result<Vec<u8>> {
 /// A failure where a weight is not fit for one.
 pub fn image_int16(model: &Model, poses: &Matrix) -> Result<Vec<u8>> {
     let folded = model.folded();
-    let parameters = Parameters {
-        inputs: folded.inputs,
-        hidden: folded.hidden,
-        outputs: folded.outputs,
-        w1: &folded.w1,
-        b1: &folded.b1,
-        w2: &folded.w2,
-        b2: &folded.b2,
-    };
+    let parameters = folded.parameters();
     let length = quantized::encoded_len(folded.inputs, folded.hidden, folded.outputs);
     let mut image = vec![0; length];
     quantized::encode(&parameters, &poses.data, &meta(model), &mut image)

@@ -4,6 +4,7 @@
 
 use super::table::{Columns, Table};
 use super::{Error, Matrix};
+use crate::whole_file;
 use std::path::Path;
 
 /// Frames of joint angles.
@@ -97,7 +98,7 @@ pub fn read_truth(path: impl AsRef<Path>) -> Result<Pairs, Error> {
 /// Writes poses as [`read_poses`] reads them, `time_s` first when there. The file appears whole or not at all.
 ///
 /// # Errors
-/// [`Error::Write`].
+/// [`Error::File`].
 pub fn write_poses(
     path: impl AsRef<Path>,
     poses: &Poses,
@@ -119,7 +120,7 @@ pub fn write_poses(
 /// Writes pairs as [`read_pairs`] reads them. The file appears whole or not at all.
 ///
 /// # Errors
-/// [`Error::Write`].
+/// [`Error::File`].
 pub fn write_pairs(
     path: impl AsRef<Path>,
     pairs: &Pairs,
@@ -136,7 +137,7 @@ pub fn write_pairs(
 /// Writes samples as [`read_samples`] reads them. The file appears whole or not at all.
 ///
 /// # Errors
-/// [`Error::Write`].
+/// [`Error::File`].
 pub fn write_samples(path: impl AsRef<Path>, samples: &Matrix, prefix: &str) -> Result<(), Error> {
     let header: Vec<String> = (0..samples.cols).map(|i| format!("{prefix}{i}")).collect();
     let lines = samples
@@ -156,8 +157,7 @@ where
         text.push_str(&line.collect::<Vec<_>>().join(","));
         text.push('\n');
     }
-    crate::whole_file::write(path, text.as_bytes()).map_err(|source| Error::Write {
-        file: path.to_owned(),
-        source,
-    })
+    whole_file::write(path, text.as_bytes())
+        .map_err(|why| whole_file::Error::writing(path, why))?;
+    Ok(())
 }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use crate::remedy::Remedy;
+use crate::whole_file;
 
 /// A row of a file.
 #[derive(Clone, Debug)]
@@ -42,26 +43,9 @@ impl core::fmt::Display for Field {
 /// What can be wrong with a file of samples. Rows are counted from 1 without the header; the line of the file comes with them.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The file cannot be opened or read.
-    #[error(
-        "cannot read {}: {source}", file.display()
-    )]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file cannot be written.
-    #[error(
-        "cannot write {}: {source}", file.display()
-    )]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// The file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] whole_file::Error),
     /// Not text, or the quotes do not close.
     #[error(
         "{}, line {line}: not CSV text ({what})", file.display()
@@ -219,8 +203,7 @@ pub enum Error {
 impl Remedy for Error {
     fn remedy(&self) -> String {
         match self {
-            Self::Read { .. } => "check the path and that you may read it".to_owned(),
-            Self::Write { .. } => "check that the folder exists and that you may write there".to_owned(),
+            Self::File(error) => error.remedy(),
             Self::NotCsv { .. } => "save it as comma-separated UTF-8 text with one header line".to_owned(),
             Self::Encoding { next, .. } => next.clone(),
             Self::NoHeader { .. } => "put a line with the columns' names above".to_owned(),

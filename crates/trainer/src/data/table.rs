@@ -4,6 +4,7 @@ use super::error::{Field, Row};
 use super::names::{Name, Unit};
 use super::text::{LONGEST, Separator, Sheet};
 use super::{Error, Matrix, Pairs, Poses, angles, require_rows, times};
+use crate::whole_file;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 
@@ -49,10 +50,8 @@ impl Table {
     /// [`Error`]: of the file, its encoding, its header or its rows.
     pub fn open(path: impl AsRef<Path>, columns: Columns<'_>) -> Result<Self, Error> {
         let path = path.as_ref();
-        let file = std::fs::File::open(path).map_err(|source| Error::Read {
-            file: path.to_owned(),
-            source,
-        })?;
+        let file =
+            std::fs::File::open(path).map_err(|why| whole_file::Error::reading(path, why))?;
         Self::read(file, path, columns)
     }
 
@@ -61,10 +60,7 @@ impl Table {
     /// # Errors
     /// [`Error`], as [`Table::open`].
     pub fn read(reader: impl Read, name: &Path, columns: Columns<'_>) -> Result<Self, Error> {
-        let failed = |source| Error::Read {
-            file: name.to_owned(),
-            source,
-        };
+        let failed = |why| Error::from(whole_file::Error::reading(name, why));
         let mut bytes = Vec::new();
         let mut reader = reader.take(LONGEST + 1);
         reader.read_to_end(&mut bytes).map_err(failed)?;

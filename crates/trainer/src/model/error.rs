@@ -3,26 +3,14 @@
 use std::path::PathBuf;
 
 use crate::remedy::Remedy;
+use crate::whole_file;
 
 /// What can be wrong with a model file.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The file cannot be opened or read.
-    #[error("cannot read {}: {source}", file.display())]
-    Read {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
-    /// The file cannot be written.
-    #[error("cannot write {}: {source}", file.display())]
-    Write {
-        /// The file.
-        file: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    /// The file cannot be read or written.
+    #[error(transparent)]
+    File(#[from] whole_file::Error),
     /// The bytes are no safetensors file.
     #[error("{} is not a safetensors file ({what})", file.display())]
     NotSafetensors {
@@ -96,10 +84,7 @@ pub enum Error {
 impl Remedy for Error {
     fn remedy(&self) -> String {
         match self {
-            Self::Read { .. } => "check the path and that you may read it".to_owned(),
-            Self::Write { .. } => {
-                "check that the folder exists and that you may write there".to_owned()
-            }
+            Self::File(error) => error.remedy(),
             Self::NotSafetensors { .. } => {
                 "give a model that gauntlet train --out wrote".to_owned()
             }

@@ -3,6 +3,7 @@
 
 use super::{Error, Metadata, Model, Normalisation};
 use crate::network::Network;
+use crate::whole_file;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
@@ -70,16 +71,14 @@ impl Model {
     /// Writes the model file; whoever looks sees the old file or the new one, never a half.
     ///
     /// # Errors
-    /// [`Error::Write`]; [`Error::BadValue`] or [`Error::TensorShape`] when the model itself is not sound, and nothing is written.
+    /// [`Error::File`]; [`Error::BadValue`] or [`Error::TensorShape`] when the model itself is not sound, and nothing is written.
     pub fn save(&self, path: impl AsRef<Path>) -> Result<(), Error> {
         let path = path.as_ref();
         let bytes = self.to_bytes();
         // A file that could not be read back must not replace one that can.
         Self::from_bytes(&bytes, path)?;
-        crate::whole_file::write(path, &bytes).map_err(|source| Error::Write {
-            file: path.to_owned(),
-            source,
-        })
+        whole_file::write(path, &bytes).map_err(|why| whole_file::Error::writing(path, why))?;
+        Ok(())
     }
 
     /// The bytes of the model file: 8 bytes length of the header, the header (JSON, padded with spaces to a multiple of 8), then the
@@ -191,7 +190,7 @@ pub fn has_digest(bytes: &[u8]) -> bool {
 /// The bytes of a model's file, of a pipe no more than a model has.
 ///
 /// # Errors
-/// [`Error::Read`].
+/// [`Error::File`].
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
     let path = path.as_ref();
     let mut bytes = Vec::new();
@@ -202,10 +201,7 @@ pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
     });
     match read {
         Ok(_) => Ok(bytes),
-        Err(source) => Err(Error::Read {
-            file: path.to_owned(),
-            source,
-        }),
+        Err(why) => Err(whole_file::Error::reading(path, why).into()),
     }
 }
 

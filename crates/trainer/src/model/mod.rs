@@ -202,15 +202,7 @@ impl Model {
     /// When the weights are not fit for an image: see [`hae::image::encode`].
     pub fn to_image(&self, meta: &hae::image::Meta) -> Result<Vec<u8>, hae::image::Error> {
         let folded = self.folded();
-        let parameters = hae::image::Parameters {
-            inputs: folded.inputs,
-            hidden: folded.hidden,
-            outputs: folded.outputs,
-            w1: &folded.w1,
-            b1: &folded.b1,
-            w2: &folded.w2,
-            b2: &folded.b2,
-        };
+        let parameters = folded.parameters();
         let length = hae::image::encoded_len(folded.inputs, folded.hidden, folded.outputs);
         let mut image = vec![0; length];
         hae::image::encode(&parameters, meta, &mut image)?;

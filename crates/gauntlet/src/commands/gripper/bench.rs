@@ -228,6 +228,27 @@ impl Waiter {
         None
     }
 
+    /// The first status for which `done` says so, or the newest when `time` is over; `first` where none comes.
+    pub fn newest<B: Bench<X>, const X: usize>(
+        &self,
+        driver: &mut B,
+        time: Duration,
+        first: Status<X>,
+        done: impl Fn(&Status<X>) -> bool,
+    ) -> Status<X> {
+        let mut newest = first;
+        self.pump(driver, time, |_, _, heard| {
+            if let Some(Ok(status)) = heard {
+                newest = status;
+                if done(&newest) {
+                    return ControlFlow::Break(());
+                }
+            }
+            ControlFlow::Continue(())
+        });
+        newest
+    }
+
     /// The first status of a gripper that is of the driver's family.
     ///
     /// # Errors

@@ -134,18 +134,11 @@ fn heard_again<B: Bench<X>, const X: usize>(
     if status.fault != Fault::NoCommunication {
         return *status;
     }
-    let waiter = doing.waiter.clone();
-    let mut newest = *status;
-    waiter.pump(&mut doing.driver, SILENCE, |_, _, heard| {
-        if let Some(Ok(status)) = heard {
-            newest = status;
-            if status.fault != Fault::NoCommunication {
-                return ControlFlow::Break(());
-            }
-        }
-        ControlFlow::Continue(())
-    });
-    newest
+    doing
+        .waiter
+        .newest(&mut doing.driver, SILENCE, *status, |status| {
+            status.fault != Fault::NoCommunication
+        })
 }
 
 /// The time is over, or the end was asked for.

@@ -85,18 +85,10 @@ impl<B> Doing<'_, B> {
         if first.activation != Activation::ChangingMode {
             return first;
         }
-        let mut newest = first;
-        let waiter = self.waiter.clone();
-        waiter.pump(&mut self.driver, MODE_WAIT, |_, _, heard| {
-            if let Some(Ok(status)) = heard {
-                newest = status;
-                if status.activation != Activation::ChangingMode {
-                    return ControlFlow::Break(());
-                }
-            }
-            ControlFlow::Continue(())
-        });
-        newest
+        self.waiter
+            .newest(&mut self.driver, MODE_WAIT, first, |status| {
+                status.activation != Activation::ChangingMode
+            })
     }
 
     /// The newest of some statuses, and whether their positions jump.

@@ -85,7 +85,7 @@ impl Bench<'_> {
         for pair in ShapePair::ALL {
             let domains = self.laboratory.shape(pair).map_err(paper::Error::from);
             let domains = domains.map_err(told)?;
-            files.extend(shapes::files::write(&self.folder, pair, &domains).map_err(told)?);
+            files.extend(shapes::files::write(&self.folder, pair, domains).map_err(told)?);
             known.push(Shape {
                 data: pair.name().to_lowercase(),
                 nodes: domains.truth.inputs.rows,

@@ -105,7 +105,7 @@ impl Bench<'_> {
     }
 
     /// Says where a result is.
-    fn wrote(&self, what: What, files: &[PathBuf], result: Option<Numbers>) -> Made {
+    fn wrote(&self, what: What, files: &[PathBuf], numbers: Option<Numbers>) -> Made {
         let names: Vec<String> = files
             .iter()
             .map(|file| file.display().to_string())
@@ -117,7 +117,7 @@ impl Bench<'_> {
         Made {
             what: what.name().to_owned(),
             files: names,
-            result,
+            numbers,
         }
     }
 }

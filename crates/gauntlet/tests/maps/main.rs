@@ -1,0 +1,12 @@
+//! Maps that are trained, measured, and refused.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+#[path = "../support/mod.rs"]
+mod support;
+
+mod domains;
+mod domains_refused;
+mod export;
+mod reproduce;
+mod training;
+mod wrong_files;

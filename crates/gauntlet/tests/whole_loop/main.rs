@@ -1,0 +1,18 @@
+//! Whole loops, and the programs that end one: real programs and virtual devices against real time.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+#[path = "../../../../tests/src/debugger.rs"]
+#[allow(dead_code)]
+mod debugger;
+#[path = "../support/mod.rs"]
+mod support;
+
+mod chip_judged;
+mod demo;
+mod devices;
+mod ends;
+mod ends_judged;
+mod every_gripper;
+mod own_faults;
+mod stalls;
+mod view;
