@@ -24,10 +24,7 @@ fn one_scan_on_a_scripted_bus_is_exactly_these_transactions() {
     assert_eq!(frames[0].good(), ALL);
     // The failed selection loses sensor 4's sample; sensor 5 selects anew and is read.
     assert_eq!(frames[1].good(), ALL & !(1 << 4));
-    let wrong = imu::Error::Bus {
-        register: 0x20,
-        cause: bus::Error::Status(0x02),
-    };
+    let wrong = imu::Error::Mux(bus::Error::Status(0x02));
     assert_eq!(frames[1].samples[4].health, Health::Missing(wrong));
 }
 
