@@ -9,6 +9,7 @@ mod faults;
 mod honest;
 mod i2c;
 mod sc18im;
+mod uart;
 mod upset;
 
 use std::sync::{Arc, Mutex};
@@ -23,6 +24,7 @@ pub use faults::Counters;
 pub use honest::Honest;
 pub use i2c::{GIVES_UP, I2cPort};
 pub use sc18im::{Chip, IDLE_TIMEOUT, MAX_DATA};
+pub use uart::{THINKS, UART_BAUD, UartCounters, UartGlove, UartSelector, UartUpset};
 pub use upset::{Met, Upset};
 
 use crate::clock::lock;
