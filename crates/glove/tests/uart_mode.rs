@@ -294,3 +294,43 @@ fn bytes_nobody_asked_for_never_make_a_wrong_frame() {
     }
     assert_eq!(bench.for_ms(5_000).last().unwrap().good(), ALL);
 }
+
+#[test]
+fn a_line_that_loses_doubles_and_flips_bytes_is_outlived() {
+    use rig::faulty::{Faults, Faulty};
+    let clock = Clock::new();
+    clock.set(Instant::from_ticks(BOOTED));
+    let glove = VirtualGlove::new(Box::new(waving), rig::glove::Config::default());
+    let (uart, selector) = glove.uart();
+    let bad = Faults {
+        drop: 0.01,
+        flip: 0.01,
+        duplicate: 0.01,
+        delay: 0.01,
+        ..Faults::default()
+    };
+    let line = Faulty::new(MemoryWire::new(&clock, uart, BAUD), &clock, 13, bad, bad);
+    let faults = line.control();
+    let bus = SensorUart::new(line, selector, mux::ADDRESS);
+    let mut scanner = BusScanner::on(bus, Config::default());
+    let (mut frames, mut whole) = (0, 0);
+    while clock.now().as_ticks() < 20_000_000 {
+        if clock.now().as_ticks() > 15_000_000 {
+            faults.to_device(Faults::default());
+            faults.to_client(Faults::default());
+        }
+        let now = clock.now();
+        if let Some(frame) = scanner.poll(now) {
+            frames += 1;
+            whole = if frame.good() == ALL { whole + 1 } else { 0 };
+        }
+        let due = scanner.next_due().unwrap_or(now);
+        clock.wait_until(due.max(Instant::from_ticks(now.as_ticks() + 1)));
+    }
+    println!("{frames} frames, {:?}", scanner.bus_mut().counters());
+    assert!(
+        whole > 50,
+        "{whole} of {frames} since: {:?}",
+        scanner.health()
+    );
+}

@@ -106,3 +106,58 @@ pub fn may_pass(code: u8) -> bool {
             | status::TIMEOUT
     )
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_all_first_two_bytes_only_the_right_ones_are_an_answer() {
+        for (first, second) in (0..=255).flat_map(|a| (0..=255).map(move |b| (a, b))) {
+            let of = |data| {
+                let expected = Expected {
+                    data,
+                    resets: false,
+                };
+                match Answer::of(&[first, second], expected) {
+                    Answer::Data(_) => 'd',
+                    Answer::Incomplete => 'i',
+                    Answer::Refused(code) if code == second => 'r',
+                    Answer::Refused(_) => '!',
+                    Answer::Garbled => 'g',
+                }
+            };
+            let to_write = match (first, second) {
+                (0xEE, 0x01) => 'd',
+                (0xEE, _) => 'r',
+                _ => 'g',
+            };
+            let to_read = match (first, second) {
+                (0xEE, 0x01) => 'g',
+                (0xEE, _) => 'r',
+                (0xBB, 8) => 'i',
+                _ => 'g',
+            };
+            assert_eq!(
+                (of(0), of(8)),
+                (to_write, to_read),
+                "{first:02X} {second:02X}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_read_is_answered_by_as_many_bytes_as_were_asked_for() {
+        let expected = Expected {
+            data: 2,
+            resets: false,
+        };
+        assert_eq!(Answer::of(&[0xBB], expected), Answer::Incomplete);
+        assert_eq!(Answer::of(&[0xBB, 2, 7], expected), Answer::Incomplete);
+        assert_eq!(
+            Answer::of(&[0xBB, 2, 7, 9], expected),
+            Answer::Data(&[7, 9])
+        );
+        assert_eq!(Answer::of(&[0xBB, 2, 7, 9, 1], expected), Answer::Garbled);
+    }
+}

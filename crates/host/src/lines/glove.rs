@@ -4,6 +4,7 @@ use glove::Instant;
 use glove::bus::{Batch, Bus, Error, Reply};
 use glove::sc18im::Sc18im;
 use glove::scan::{BusScanner, Config, Scanner};
+use glove::timing::FUSION_PERIOD;
 
 use super::i2c;
 use super::port::{Port, Watch};
@@ -26,14 +27,18 @@ impl GloveLine {
         }
     }
 
-    /// The scanner on it; the speed of a serial port is found and kept by it.
-    pub fn scanner(self, config: Config) -> BusScanner<GloveBus> {
+    /// The scanner on it. The speed of a serial port is found and kept by it; on an I²C port a scan takes less than the sensors need
+    /// for new samples, so that it begins no more than one in that time.
+    pub fn scanner(self, mut config: Config) -> BusScanner<GloveBus> {
         let bus = match self {
             Self::Serial(port) => {
                 let scanner = Scanner::new(port, config).with_set_baud();
                 GloveBus::Serial(Box::new(scanner.into_bus()))
             }
-            Self::I2c(port) => GloveBus::I2c(port),
+            Self::I2c(port) => {
+                config.period = config.period.max(FUSION_PERIOD);
+                GloveBus::I2c(port)
+            }
         };
         BusScanner::on(bus, config)
     }
