@@ -190,7 +190,7 @@ impl<F, R> Platform for Home<'_, '_, F, R> {
 }
 
 impl<'s, 't, F: Slot, R: Gripper<AXES>> Board<AXES> for Home<'s, 't, F, R> {
-    type Glove = Port<'s, 't>;
+    type Glove = glove::sc18im::Sc18im<Port<'s, 't>>;
     type Gripper = R;
     type Flash = F;
 }

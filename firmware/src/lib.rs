@@ -8,7 +8,7 @@
 use bridge::protocol::{Machine, Outcome, Server};
 use bridge::{App, Board, Config, WeightsStore, glove};
 use embedded_io::{Read, ReadReady, Write};
-use glove::scan::Scanner;
+use glove::scan::{self, BusScanner};
 
 /// Axes of the 3-Finger gripper.
 pub const AXES: usize = 4;
@@ -23,11 +23,9 @@ pub trait Chip: Board<AXES> {
     /// The gripper on its line: [`bridge::gripper::driver::ThreeFinger`] with the time this board's line wants.
     fn gripper(line: Self::Line) -> Self::Gripper;
 
-    /// The glove's scanner on its port: at 115,200 baud, for good. A board whose port can change its speed
-    /// ([`glove::sc18im::SetBaud`]) gives the scanner [`Scanner::with_set_baud`] and says how fast in
-    /// [`glove::scan::Config::raise_to`]; a glove whose power was cut is then found again.
-    fn scanner(port: Self::Glove) -> Scanner<Self::Glove> {
-        Scanner::new(port, glove::scan::Config::default())
+    /// The glove's scanner on its bus.
+    fn scanner(bus: Self::Glove) -> BusScanner<Self::Glove> {
+        BusScanner::on(bus, scan::Config::default())
     }
 
     /// Starts the watchdog: from now on a second without [`Chip::feed_watchdog`] resets the machine.
@@ -44,7 +42,9 @@ pub trait Chip: Board<AXES> {
 pub struct Devices<C: Chip> {
     /// The host protocol's line.
     pub host: C::Host,
-    /// The line of the glove's serial multiplexer.
+    /// The bus of the glove's sensors: [`glove::sc18im::Sc18im`] on the port of its serial multiplexer, at 115,200 baud for good. A
+    /// board whose port can change its speed ([`glove::sc18im::SetBaud`]) gives it `with_set_baud` and says how fast in
+    /// [`glove::sc18im::Config::raise_to`]; a glove whose power was cut is then found again.
     pub glove: C::Glove,
     /// The gripper's Modbus RTU line.
     pub gripper: C::Line,

@@ -157,7 +157,7 @@ impl Platform for Machine {
 }
 
 impl Board<AXES> for Machine {
-    type Glove = Tap<Faulty<MemoryWire>>;
+    type Glove = glove::sc18im::Sc18im<Tap<Faulty<MemoryWire>>>;
     type Gripper = ThreeFinger<Tap<Faulty<MemoryWire>>>;
     type Flash = NorSlot;
 }

@@ -82,7 +82,7 @@ fn waving(time_s: f64) -> [f32; 25] {
 }
 
 impl Board<4> for Machine {
-    type Glove = MemoryWire;
+    type Glove = glove::sc18im::Sc18im<MemoryWire>;
     type Gripper = ThreeFinger<MemoryWire>;
     type Flash = NorSlot;
 }

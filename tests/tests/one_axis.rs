@@ -34,7 +34,7 @@ impl Platform for Machine {
 }
 
 impl Board<1> for Machine {
-    type Glove = MemoryWire;
+    type Glove = glove::sc18im::Sc18im<MemoryWire>;
     type Gripper = TwoFinger<MemoryWire>;
     type Flash = NorSlot;
 }

@@ -39,7 +39,7 @@ impl Platform for Machine {
 }
 
 impl Board<4> for Machine {
-    type Glove = MemoryWire;
+    type Glove = glove::sc18im::Sc18im<MemoryWire>;
     type Gripper = ThreeFinger<MemoryWire>;
     type Flash = NorSlot;
 }

@@ -1,8 +1,8 @@
 //! What the bridge needs from its home: a microcontroller's board, a PC, or a test's virtual clock.
 
 use crate::Instant;
-use embedded_io::{Read, ReadReady, Write};
 use embedded_storage::nor_flash::NorFlash;
+use glove::bus::Bus;
 use gripper::Gripper;
 
 /// The clock, and a way to sleep.
@@ -20,8 +20,8 @@ pub trait Platform {
 /// A board is one value with the clock ([`Platform`]); the devices themselves are handed to [`crate::App::new`], which
 /// owns them from then on.
 pub trait Board<const X: usize>: Platform {
-    /// The port of the glove's serial multiplexer. Its reads and writes never wait.
-    type Glove: Read + ReadReady + Write;
+    /// The bus of the glove's sensors: [`glove::sc18im::Sc18im`] on a serial port, or another way to them. It never waits.
+    type Glove: Bus;
     /// The gripper, whatever line it is on.
     type Gripper: Gripper<X>;
     /// A slot of the weights store.

@@ -159,7 +159,7 @@ impl Platform for Counted {
 }
 
 impl Board<4> for Counted {
-    type Glove = Port;
+    type Glove = glove::sc18im::Sc18im<Port>;
     type Gripper = ThreeFinger<Port>;
     type Flash = Flash<4096>;
 }

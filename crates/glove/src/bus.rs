@@ -31,7 +31,8 @@ pub enum Error {
     },
     /// The reply was read only after its deadline, for the caller stood still: it says nothing about now and was thrown away.
     Stalled,
-    /// The serial bridge reported a status its data sheet does not have.
+    /// A status that should not be: one the serial bridge's data sheet does not have, a selection that reads back otherwise, or
+    /// what a sensor in UART mode refuses with.
     Status(u8),
     /// The serial bridge does not answer; it is being resynchronised.
     NoAnswer,
@@ -51,7 +52,7 @@ pub enum Error {
     Unsupported,
     /// The clock of a blocking call stood still.
     ClockStopped,
-    /// Any other failure of a blocking bus.
+    /// Any other failure of a blocking bus, or of a channel selector.
     Other,
 }
 
@@ -65,14 +66,14 @@ impl core::fmt::Display for Error {
                 write!(f, "{received} of {expected} reply bytes arrived")
             }
             Error::Stalled => f.write_str("the reply lay unread past its deadline"),
-            Error::Status(code) => write!(f, "unknown I2C status {code:#04X}"),
+            Error::Status(code) => write!(f, "unexpected status {code:#04X}"),
             Error::NoAnswer => f.write_str("the serial bridge does not answer"),
             Error::Port => f.write_str("the serial port failed"),
             Error::Busy => f.write_str("a transaction is under way"),
             Error::TooLong { length, limit } => write!(f, "{length} bytes where {limit} fit"),
             Error::Unsupported => f.write_str("a transaction the bus cannot make"),
             Error::ClockStopped => f.write_str("the clock stood still"),
-            Error::Other => f.write_str("the I2C bus failed"),
+            Error::Other => f.write_str("the bus failed"),
         }
     }
 }

@@ -37,6 +37,9 @@ pub mod register {
     pub const UNIQUE_ID: u8 = 0x50;
 }
 
+/// Bit of [`register::SYS_TRIGGER`] that resets the sensor.
+pub const RESET_BIT: u8 = 0x20;
+
 /// What tells a sensor from all others.
 pub type UniqueId = [u8; 16];
 

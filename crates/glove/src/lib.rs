@@ -6,6 +6,7 @@
 //! |---|---|
 //! | [`bus`] | what is asked of an I²C bus that does not wait |
 //! | [`sc18im`] | bytes of the serial bridge: one I²C transaction at a time, split-phase, with deadlines and resynchronisation |
+//! | [`uart`] | sensors in UART mode behind a channel selector, as a bus |
 //! | [`timing`] | every time the glove waits for, and the sum behind it |
 //! | [`mux`] | which channel is connected |
 //! | [`imu`] | the sensor's registers, its bring-up, and what a bad sample looks like |
@@ -28,6 +29,7 @@ pub mod mux;
 pub mod sc18im;
 pub mod scan;
 pub mod timing;
+pub mod uart;
 
 #[cfg(test)]
 mod testing;

@@ -67,6 +67,17 @@ impl core::fmt::Display for Health {
     }
 }
 
+/// Something that went wrong with one sensor: mended since, or not yet ([`Health`] tells).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Trouble {
+    /// What it was, with the sensor's register.
+    pub error: imu::Error,
+    /// When it was found.
+    pub at: Instant,
+    /// How often anything went wrong with this sensor until then.
+    pub count: u32,
+}
+
 /// One scan: 16 samples in the order of [`crate::hand::SEGMENT_NAMES`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -268,6 +279,11 @@ impl<B: Bus> BusScanner<B> {
     /// How each sensor is now, frames or not.
     pub fn health(&self) -> [Health; SEGMENT_COUNT] {
         core::array::from_fn(|k| self.sensors[k].health)
+    }
+
+    /// What went wrong with each sensor last, a failure that a second try mended among them; `None` where nothing ever did.
+    pub fn troubles(&self) -> [Option<Trouble>; SEGMENT_COUNT] {
+        core::array::from_fn(|k| self.sensors[k].trouble)
     }
 
     /// The oldest finding that was not taken yet. At most [`FINDINGS_MAX`] wait; a further one takes the oldest's place, counted.

@@ -14,6 +14,9 @@
 //! selection overlap with its work on the bus, so that the virtual glove takes 26.6 ms. With the register written before
 //! every read (4 bytes more on the line and 2 on the bus, a sensor) it is 34.2 ms; without the read-back of the selection that
 //! is about the 30.6 ms of a plain driver.
+//!
+//! The same 16 sensors in UART mode ([`crate::uart`]) at 115200 baud: 16 · (4 sent + 10 received) = 224 bytes = 19.4 ms, and 16 times
+//! [`SELECTOR_SETTLE`]: 20.8 ms, 48 scans a second, besides what a sensor thinks before it answers.
 
 use crate::{Duration, Instant};
 
@@ -45,6 +48,20 @@ pub const DRAIN_MAX: Duration = Duration::from_ticks(60_000);
 
 /// The serial bridge forgets half a command after 655 ms without a byte (not confirmed by its vendor); a little more.
 pub const IDLE_TIMEOUT: Duration = Duration::from_ticks(660_000);
+
+/// After a channel selector has moved, nothing is sent for as long as a character takes at 115200 baud: what the switching looked
+/// like to the sensor is then over.
+pub const SELECTOR_SETTLE: Duration = Duration::from_ticks(87);
+
+/// Pause before a command that a sensor in UART mode did not take is sent again, and between its pieces of two bytes: users report
+/// that 2 to 3 ms end its overruns.
+pub const UART_PIECES: Duration = Duration::from_ticks(2_500);
+
+/// How often a sensor in UART mode is asked again that refuses with an overrun, or answers what cannot be.
+pub const UART_RETRIES: u8 = 5;
+
+/// Pause before a failed port is tried again.
+pub const PORT_RETRY: Duration = Duration::from_ticks(500_000);
 
 /// How often a silent serial bridge is asked, [`IDLE_TIMEOUT`] apart, before it counts as dead.
 pub const RESYNC_TRIES: u8 = 5;

@@ -20,7 +20,7 @@ fn main() -> anyhow::Result<()> {
     let (clock, interrupt, model) = (Clock::start(), Interrupt::install()?, Model::ThreeFinger);
     let (gripper, _) = probe::open_gripper(Path::new(gripper), model, &Nobody, &interrupt)?;
     let parts = Parts {
-        glove: probe::open_glove(Path::new(glove), &interrupt)?.port,
+        glove: probe::open_glove(Path::new(glove), &interrupt)?.port.into(),
         gripper,
         model,
         line: Settings::default(),

@@ -18,7 +18,9 @@ mod serial;
 use serde::Serialize;
 
 pub use cure::cure;
-pub use glove::{glove, keeps_registers, missing_sensors, no_glove, no_sensors};
+pub use glove::{
+    glove, keeps_registers, missing_sensors, multiplexer_answers, no_glove, no_sensors,
+};
 pub use gripper::{gripper, no_gripper};
 pub use place::{Asked, Place};
 

@@ -13,6 +13,8 @@ use crate::clock::Clock;
 use crate::diagnose;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::lines::glove::GloveLine;
+use crate::lines::i2c;
 use crate::lines::port::{BAUD, Port};
 use crate::lines::{Line, Model, Settings, tcp};
 use crate::report::Reporter;
@@ -43,6 +45,35 @@ pub struct Glove {
     pub port: Port,
     /// The speed it spoke where it was another, and was switched: 9600 baud, as after power-on, or what a program left it at.
     pub switched: Option<u32>,
+}
+
+/// A glove that answers, whichever way leads to it.
+#[derive(Debug)]
+pub struct GloveFound {
+    /// The way to it.
+    pub line: GloveLine,
+    /// As [`Glove::switched`].
+    pub switched: Option<u32>,
+}
+
+/// Opens the way to a glove: a serial port as [`open_glove`] does, or `i2c:/dev/i2c-N`, where its multiplexer is asked.
+///
+/// # Errors
+/// A failure that says whether the port does not open or nobody answers on it, and what to try.
+pub fn open_glove_line(path: &Path, interrupt: &Interrupt) -> Result<GloveFound> {
+    if let Some(address) = i2c::Address::parse(path)? {
+        let mut port = i2c::open(&address)?;
+        diagnose::multiplexer_answers(&address, &mut port, interrupt)?;
+        return Ok(GloveFound {
+            line: GloveLine::I2c(port),
+            switched: None,
+        });
+    }
+    let Glove { port, switched } = open_glove(path, interrupt)?;
+    Ok(GloveFound {
+        line: port.into(),
+        switched,
+    })
 }
 
 /// Opens the glove's port and finds its serial multiplexer: at 115200 baud, or, fresh from power-on, at 9600, or where a faster

@@ -7,7 +7,10 @@ mod bno055;
 mod bus;
 mod faults;
 mod honest;
+mod i2c;
 mod sc18im;
+mod uart;
+mod upset;
 
 use std::sync::{Arc, Mutex};
 
@@ -19,7 +22,10 @@ pub use ::glove::hand::Side;
 pub use bno055::{BOOT, ENTER_CONFIG, FUSION_PERIOD, LEAVE_CONFIG};
 pub use faults::Counters;
 pub use honest::Honest;
+pub use i2c::{GIVES_UP, I2cPort};
 pub use sc18im::{Chip, IDLE_TIMEOUT, MAX_DATA};
+pub use uart::{THINKS, UART_BAUD, UartCounters, UartGlove, UartSelector, UartUpset};
+pub use upset::{Met, Upset};
 
 use crate::clock::lock;
 use crate::{Device, Instant, PoseSource};

@@ -9,6 +9,7 @@ mod time;
 mod uart;
 mod watchdog;
 
+use bridge::glove::sc18im::{self, Sc18im};
 use bridge::gripper::driver::{self, ThreeFinger};
 use bridge::gripper::timing;
 use bridge::protocol::Machine;
@@ -39,7 +40,7 @@ pub fn take() -> Option<(Mps2, Devices<Mps2>)> {
     let time = SystemTime::start(core.SYST);
     let devices = Devices {
         host: Port::open(Uart::Host)?,
-        glove: Port::open(Uart::Glove)?,
+        glove: Sc18im::new(Port::open(Uart::Glove)?, sc18im::Config::default()),
         gripper: Port::open(Uart::Gripper)?,
         slots: flash::slots(),
     };
@@ -66,7 +67,7 @@ impl Platform for Mps2 {
 }
 
 impl Board<AXES> for Mps2 {
-    type Glove = Port;
+    type Glove = Sc18im<Port>;
     type Gripper = ThreeFinger<Port>;
     type Flash = PsramSlot;
 }

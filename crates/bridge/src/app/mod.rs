@@ -24,7 +24,7 @@ use crate::telemetry::{Sent, Telemetry};
 use crate::{HIDDEN, Instant};
 use calibrating::Calibrating;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::Scanner;
+use glove::scan::BusScanner;
 use gripper::{Gripper, Status};
 use hae::image::JointOrder;
 
@@ -45,7 +45,7 @@ type CycleEnd<B, const X: usize> = Result<Status<X>, GripperError<B, X>>;
 /// The bridge: `B` its home, `X` the gripper's number of axes.
 pub struct App<B: Board<X>, const X: usize> {
     board: B,
-    scanner: Scanner<B::Glove>,
+    scanner: BusScanner<B::Glove>,
     gripper: B::Gripper,
     store: WeightsStore<B::Flash>,
     supervisor: Supervisor<X>,
@@ -95,7 +95,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     /// Ties the parts together. Sends nothing; the newest whole image of the store is the map.
     pub fn new(
         mut board: B,
-        scanner: Scanner<B::Glove>,
+        scanner: BusScanner<B::Glove>,
         gripper: B::Gripper,
         store: WeightsStore<B::Flash>,
         config: Config<X>,
@@ -265,8 +265,8 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         &self.store
     }
 
-    /// The glove's scanner: its counters, its port.
-    pub fn scanner_mut(&mut self) -> &mut Scanner<B::Glove> {
+    /// The glove's scanner: its counters, its bus.
+    pub fn scanner_mut(&mut self) -> &mut BusScanner<B::Glove> {
         &mut self.scanner
     }
 

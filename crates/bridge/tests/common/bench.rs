@@ -40,7 +40,7 @@ impl Platform for Virtual {
 }
 
 impl Board<4> for Virtual {
-    type Glove = MemoryWire;
+    type Glove = glove::sc18im::Sc18im<MemoryWire>;
     type Gripper = ThreeFinger<MemoryWire>;
     type Flash = Flash;
 }

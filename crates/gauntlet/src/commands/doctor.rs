@@ -33,7 +33,7 @@ pub struct Doctor {
     /// The gripper's serial port, or `tcp:HOST[:PORT]`.
     #[arg(long, value_name = "PORT")]
     pub gripper: Option<PathBuf>,
-    /// The glove's serial port.
+    /// The glove's serial port, or `i2c:/dev/i2c-N`.
     #[arg(long, value_name = "PORT")]
     pub glove: Option<PathBuf>,
     /// How the gripper's line differs from that of a gripper as delivered.

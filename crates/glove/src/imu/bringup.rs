@@ -120,21 +120,28 @@ impl BringUp {
         if let Some(error) = self.failed {
             return Next::Failed(error);
         }
-        let mut replay = Replay {
-            log: &self.log,
-            cursor: 0,
-            wanted: None,
-        };
-        let result = run(self.step, &mut replay, self.address, &self.config);
+        let (result, replay) = self.run();
         match (result, replay.wanted) {
             (Ok(outcome), _) => Next::Done(outcome),
             (Err(Failure::Bus), Some(transaction)) => Next::Transaction(transaction),
             (Err(Failure::Bus), None) => Next::Failed(Error::Bus {
-                register: register::CHIP_ID,
+                register: replay.register,
                 cause: bus::Error::Unsupported,
             }),
             (Err(Failure::Sensor(error)), _) => Next::Failed(error),
         }
+    }
+
+    /// Runs the step as far as the replies go.
+    fn run(&self) -> (Result<Outcome, Failure>, Replay<'_>) {
+        let mut replay = Replay {
+            log: &self.log,
+            cursor: 0,
+            wanted: None,
+            register: register::CHIP_ID,
+        };
+        let result = run(self.step, &mut replay, self.address, &self.config);
+        (result, replay)
     }
 
     /// The answer to the transaction that [`BringUp::next`] named.
@@ -147,10 +154,8 @@ impl BringUp {
             Ok(Err(_)) => bus::Error::Unsupported,
             Err(cause) => cause,
         };
-        let register = match self.next() {
-            Next::Transaction(wanted) => wanted.bytes().first().copied().unwrap_or(0),
-            _ => 0,
-        };
+        let (_, replay) = self.run();
+        let register = replay.register;
         self.failed = Some(Error::Bus { register, cause });
     }
 }
@@ -320,6 +325,8 @@ struct Replay<'a> {
     log: &'a [Entry],
     cursor: usize,
     wanted: Option<Transaction>,
+    /// The register addressed last; a plain read goes on there.
+    register: u8,
 }
 
 /// The replay's only error: the reply is not known yet.
@@ -342,6 +349,9 @@ impl I2c for Replay<'_> {
         address: u8,
         operations: &mut [Operation<'_>],
     ) -> Result<(), Unanswered> {
+        if let Some(Operation::Write([register, ..])) = operations.first() {
+            self.register = *register;
+        }
         let Some(reply) = self.log.get(self.cursor) else {
             self.wanted = describe(address, operations);
             return Err(Unanswered);

@@ -154,14 +154,19 @@ impl<B: Bus> BusScanner<B> {
         result: Result<Reply, Error>,
         now: Instant,
     ) {
-        let sample = result.and_then(|reply| {
+        let at_sensor = |cause| imu::Error::Bus {
+            register: register::QUATERNION,
+            cause,
+        };
+        let unsupported = at_sensor(Error::Unsupported);
+        let sample = result.map_err(at_sensor).and_then(|reply| {
             let (confirmation, sample) = reply
                 .split_at_checked(usize::from(selects))
-                .ok_or(Error::Unsupported)?;
+                .ok_or(unsupported)?;
             if let [read_back] = confirmation {
-                self.confirm(k, *read_back)?;
+                self.confirm(k, *read_back).map_err(imu::Error::Mux)?;
             }
-            <[u8; SAMPLE_BYTES]>::try_from(sample).map_err(|_| Error::Unsupported)
+            <[u8; SAMPLE_BYTES]>::try_from(sample).map_err(|_| unsupported)
         });
         let baud = self.bus.line_baud().unwrap_or(self.config.baud);
         let longest = timing::scan_gap(baud, self.config.period);
@@ -176,7 +181,7 @@ impl<B: Bus> BusScanner<B> {
                     self.seen = stamp;
                 }
             }
-            Err(cause) => sensor.miss(cause, now, &mut self.counters),
+            Err(error) => sensor.miss(error, now, &mut self.counters),
         }
     }
 
@@ -378,8 +383,12 @@ impl<B: Bus> BusScanner<B> {
                 })
             }
             Err(cause) => {
+                let error = imu::Error::Bus {
+                    register: register::QUATERNION,
+                    cause,
+                };
                 if let Some(sensor) = self.sensors.get_mut(k) {
-                    sensor.miss(cause, now, &mut self.counters);
+                    sensor.miss(error, now, &mut self.counters);
                 }
             }
         }

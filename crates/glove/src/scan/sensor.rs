@@ -1,7 +1,7 @@
 //! What the scanner knows of one sensor, and how samples and failures change it.
 
 use super::suspect::{AGREE_WITHIN, Cause, Return, Suspect};
-use super::{Counters, Health, Sample};
+use super::{Counters, Health, Sample, Trouble};
 use crate::bus;
 use crate::hand::Quaternion;
 use crate::imu::bringup::{Outcome, Step};
@@ -14,6 +14,12 @@ const BAD_MAX: u8 = 3;
 
 /// Rechecks in a row without a good sample after which it is brought up again.
 const RECHECKS_MAX: u8 = 3;
+
+/// How often another chip id is read, before the sensor counts as another chip.
+const CHIP_ID_TRIES: u8 = 3;
+
+/// How often a sensor is found not to run, before it is set up again without a reset.
+const VERIFY_TRIES: u8 = 3;
 
 /// A joint seldom turns more than three times as far as the one before it.
 const LEAST_PART: f32 = 3.0;
@@ -42,6 +48,8 @@ pub(super) struct Sensor {
     pub is_twin: bool,
     /// It has just been believed again, far from where it was.
     pub returned: Option<Return>,
+    /// What went wrong with it last.
+    pub trouble: Option<Trouble>,
     good: Option<(Quaternion, Instant)>,
     /// Nobody looked at any sensor for a while, and until then it was good: it was not away.
     unseen: bool,
@@ -74,6 +82,7 @@ impl Sensor {
             distrusted: None,
             is_twin: false,
             returned: None,
+            trouble: None,
             good: None,
             unseen: false,
             asked: NEVER,
@@ -244,6 +253,7 @@ impl Sensor {
         }
         count(fault, counters);
         self.health = Health::Rejected(fault);
+        self.note(Error::Rejected(fault), now);
         match fault {
             // Right bytes of the right register, only not to be believed: time mends these.
             Fault::TooFast | Fault::Away | Fault::AllFrozen | Fault::Twin => return,
@@ -286,15 +296,15 @@ impl Sensor {
     }
 
     /// A sample did not come.
-    pub fn miss(&mut self, cause: bus::Error, now: Instant, counters: &mut Counters) {
-        let error = Error::Bus {
-            register: imu::register::QUATERNION,
-            cause,
-        };
+    pub fn miss(&mut self, error: Error, now: Instant, counters: &mut Counters) {
+        self.note(error, now);
         counters.missed = counters.missed.wrapping_add(1);
         self.health = Health::Missing(error);
         self.raw = None;
         self.pointer_set = false;
+        let (Error::Bus { cause, .. } | Error::Mux(cause)) = error else {
+            return;
+        };
         if !is_sensors(cause) {
             return;
         }
@@ -302,6 +312,14 @@ impl Sensor {
         if cause.is_nack() || self.bad >= BAD_MAX {
             self.recheck(error, now);
         }
+    }
+
+    /// Keeps what went wrong, for who wants to know.
+    fn note(&mut self, error: Error, at: Instant) {
+        let count = self
+            .trouble
+            .map_or(1, |before| before.count.saturating_add(1));
+        self.trouble = Some(Trouble { error, at, count });
     }
 
     fn recheck(&mut self, error: Error, now: Instant) {
@@ -368,6 +386,7 @@ impl Sensor {
     /// A step failed; true when its bring-up starts over.
     pub fn step_failed(&mut self, step: Step, error: Error, now: Instant) -> bool {
         self.forget();
+        self.note(error, now);
         if let Error::Bus { cause, .. } | Error::Mux(cause) = error
             && !is_sensors(cause)
         {
@@ -380,7 +399,9 @@ impl Sensor {
         }
         self.tries = self.tries.saturating_add(1);
         let limit = match (step, error) {
-            (_, Error::ChipId(_) | Error::SameSensor { .. } | Error::OtherSensor) => 1,
+            (_, Error::SameSensor { .. } | Error::OtherSensor) => 1,
+            // Three times the same is no flipped bit.
+            (_, Error::ChipId(_)) => CHIP_ID_TRIES,
             (Step::Identify, _) if self.tried => 1,
             (Step::Identify, _) => timing::FIRST_TRIES,
             _ => timing::STEP_TRIES,
@@ -388,6 +409,10 @@ impl Sensor {
         if self.tries >= limit {
             self.restart(error, now);
             return true;
+        }
+        if step == Step::Verify && self.tries.is_multiple_of(VERIFY_TRIES) {
+            // The mode, or what comes before it, may never have been written.
+            self.step = Some(Step::Configure);
         }
         self.due = after(now, timing::STEP_RETRY);
         false

@@ -5,7 +5,6 @@ use crate::imu::{Fault, Mode};
 
 mod fake;
 mod noise;
-mod script;
 
 use fake::{Chip, Fake, registers};
 

@@ -130,6 +130,11 @@ pub fn waving(t: f64) -> [f32; 25] {
 
 /// Every good sample is what its own sensor measured when it was asked, or one period of the fusion before.
 pub fn assert_true(bench: &Bench, frames: &[Frame]) {
+    assert_measured(&bench.glove, frames);
+}
+
+/// The same of any glove.
+pub fn assert_measured(glove: &VirtualGlove, frames: &[Frame]) {
     for frame in frames {
         for (k, sample) in frame
             .samples
@@ -137,7 +142,7 @@ pub fn assert_true(bench: &Bench, frames: &[Frame]) {
             .enumerate()
             .filter(|(_, s)| s.health.is_good())
         {
-            let [w, x, y, z] = bench.glove.true_orientation(k, sample.stamp);
+            let [w, x, y, z] = glove.true_orientation(k, sample.stamp);
             let q = sample.orientation;
             let dot = (q.w * w + q.i * x + q.j * y + q.k * z).abs();
             let off = 2.0 * dot.min(1.0).acos();

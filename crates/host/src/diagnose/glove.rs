@@ -2,6 +2,7 @@
 
 mod bridge_chip;
 mod bridge_line;
+mod i2c;
 mod sensors;
 
 use std::path::Path;
@@ -9,7 +10,7 @@ use std::time::Duration;
 
 use glove::hand::SEGMENT_COUNT;
 use glove::mux;
-use glove::scan::Health;
+use glove::scan::{Config, Health, Scanner};
 
 use super::Findings;
 use super::answer::Came;
@@ -17,6 +18,7 @@ use super::search::persist;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::lines::UNIT;
+use crate::lines::i2c::Address;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
 use crate::next::{Command, advice};
@@ -24,16 +26,32 @@ use bridge_chip::{
     BAUDS, BUS_HUNG, DONE, MULTIPLEXERS, NO_ACKNOWLEDGE, READ_STATUS, RESET_BAUD, SET_TIMEOUT, WAIT,
 };
 use bridge_line::{UNKEPT_NEXT, ask, nobody, survey, unkept};
+pub use i2c::multiplexer_answers;
 
 /// Finds out which layer of the glove at `path` fails. Ends within half a minute, whatever comes.
 pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
     let mut findings = Findings::default();
+    match Address::parse(path) {
+        Ok(None) => {}
+        Ok(Some(address)) => return i2c::glove(&address, interrupt),
+        Err(failure) => {
+            findings.failure("port", &failure);
+            return findings;
+        }
+    }
     if let Some((port, baud)) = find(path, &BAUDS, &mut findings, interrupt) {
         let mut port = port;
         if let Some(what) = unkept(&mut port, interrupt) {
             findings.wrong("bridge", what, UNKEPT_NEXT);
         } else if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
-            sensors::sensors(port, baud, address, &mut findings, interrupt);
+            let config = Config {
+                baud,
+                mux: address,
+                ..Config::default()
+            };
+            let watch = port.watch();
+            let scanner = Scanner::new(port, config);
+            sensors::sensors(scanner, watch, &mut findings, interrupt);
         }
     }
     findings

@@ -1,5 +1,7 @@
-//! A gripper's line: a serial port, or Modbus TCP. The driver does not care which.
+//! The lines to the devices: a gripper's serial port or Modbus TCP, a glove's serial port or I²C port. The drivers do not care which.
 
+pub mod glove;
+pub mod i2c;
 pub mod list;
 mod model;
 mod platform;

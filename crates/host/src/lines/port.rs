@@ -21,6 +21,7 @@ mod open;
 mod speed;
 
 pub use open::OpenError;
+pub(super) use open::group_of;
 use open::{check_kind, classify, system};
 
 /// The speed both device links run at unless told otherwise.

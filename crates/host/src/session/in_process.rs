@@ -8,7 +8,7 @@ use std::thread::JoinHandle;
 use anyhow::Result;
 use bridge::{App, Board, WeightsStore};
 use glove::hand::Side;
-use glove::scan::{self, Scanner};
+use glove::scan;
 use gripper::driver::{ThreeFinger, TwoFinger};
 
 use super::Session;
@@ -21,7 +21,8 @@ use super::worker::{PcApp, Worker};
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
-use crate::lines::port::{BAUD, Port, Watch};
+use crate::lines::glove::{GloveBus, GloveLine};
+use crate::lines::port::{BAUD, Watch};
 use crate::lines::{Line, Model, Pc, Settings};
 use crate::next::{Command, advice};
 use crate::realtime::{self, Scheduling};
@@ -29,8 +30,8 @@ use crate::realtime::{self, Scheduling};
 /// What a session is made of.
 #[derive(Debug)]
 pub struct Parts {
-    /// The glove's port.
-    pub glove: Port,
+    /// The way to the glove.
+    pub glove: GloveLine,
     /// The gripper's line.
     pub gripper: Line,
     /// Which gripper it is.
@@ -77,7 +78,7 @@ impl InProcess {
         driver: impl FnOnce(Line, gripper::driver::Config) -> <Pc as Board<X>>::Gripper + Send + 'static,
     ) -> Result<Self>
     where
-        Pc: Board<X, Glove = Port, Flash = MemorySlot>,
+        Pc: Board<X, Glove = GloveBus, Flash = MemorySlot>,
     {
         let store = stored(&parts.image, parts.model)?;
         let settings = bridge::Settings::<X> {
@@ -105,7 +106,7 @@ impl InProcess {
                     baud: BAUD,
                     ..scan::Config::default()
                 };
-                let scanner = Scanner::new(glove, scan).with_set_baud();
+                let scanner = glove.scanner(scan);
                 let gripper = driver(gripper, line);
                 let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);
                 worker.scheduling = scheduling.recv().unwrap_or(Scheduling::Shared);

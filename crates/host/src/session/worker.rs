@@ -13,18 +13,18 @@ use super::record::{Command, Feed, Frame, Imu, Record, Sort};
 use super::slots::MemorySlot;
 use super::snapshot::Snapshot;
 use super::stopped::{HOLD_WAIT, Standing, Stopped};
-use crate::lines::port::Port;
+use crate::lines::glove::GloveBus;
 use crate::lines::{Line, Pc};
 use crate::realtime::Scheduling;
 
 impl Board<4> for Pc {
-    type Glove = Port;
+    type Glove = GloveBus;
     type Gripper = ThreeFinger<Line>;
     type Flash = MemorySlot;
 }
 
 impl Board<1> for Pc {
-    type Glove = Port;
+    type Glove = GloveBus;
     type Gripper = TwoFinger<Line>;
     type Flash = MemorySlot;
 }

@@ -160,6 +160,11 @@ impl Bno055 {
         self.boot_until = now + BOOT;
     }
 
+    /// Where the register pointer stands.
+    pub fn pointer(&self) -> u8 {
+        self.pointer
+    }
+
     /// Whether it has booted by `now`.
     pub fn booted(&self, now: Instant) -> bool {
         now >= self.boot_until

@@ -1,6 +1,7 @@
 //! The I2C bus behind the serial bridge: TCA9548A at 0x70, two BNO055 on each of its channels.
 
 use super::bno055::Bno055;
+use super::upset::{Met, Upset, Upsets};
 use crate::{Duration, Instant};
 
 /// Address of the multiplexer with its pins low.
@@ -13,6 +14,7 @@ const SENSORS: [u8; 2] = [0x28, 0x29];
 pub(super) enum Status {
     Done = 0xF0,
     NackAddress = 0xF1,
+    NackData = 0xF2,
     TimedOut = 0xF8,
 }
 
@@ -54,6 +56,7 @@ pub(super) struct Bus {
     pub dead: bool,
     pub transactions: u64,
     pub nacks: u64,
+    pub upsets: Upsets,
 }
 
 /// Gives the orientation of a sensor (w, x, y, z) in a run of its fusion, at a moment.
@@ -70,6 +73,7 @@ impl Bus {
             dead: false,
             transactions: 0,
             nacks: 0,
+            upsets: Upsets::default(),
         }
     }
 
@@ -81,14 +85,25 @@ impl Bus {
         timing: Timing,
         orientation: Orientation<'_>,
     ) -> Option<Outcome> {
+        let number = self.transactions;
         self.transactions += 1;
-        let timed_out = |takes| Outcome {
-            status: Status::TimedOut,
+        let ended = |status, takes| Outcome {
+            status,
             answer: Vec::new(),
             takes,
         };
+        let timed_out = |takes| ended(Status::TimedOut, takes);
         if self.dead {
             return timing.timeout.map(timed_out);
+        }
+        let upset = self.upset(number, segments);
+        let one_byte = Duration::from_ticks(20 * timing.bit_ns / 1_000);
+        match upset {
+            Some(Upset::NackAddress) => return Some(ended(Status::NackAddress, one_byte)),
+            Some(Upset::NackData) => return Some(ended(Status::NackData, one_byte)),
+            Some(Upset::Ignored) => return Some(ended(Status::Done, one_byte)),
+            Some(Upset::TimedOut) => return timing.timeout.map(timed_out),
+            Some(Upset::Short(_) | Upset::Flipped { .. }) | None => {}
         }
         let mut message = Message::new(now, timing.bit_ns, self.channels);
         let done = segments
@@ -104,6 +119,9 @@ impl Bus {
             self.nacks += 1;
             message.answer.clear();
         }
+        if let Some(upset) = upset {
+            upset.spoil(&mut message.answer);
+        }
         Some(Outcome {
             status: if done {
                 Status::Done
@@ -113,6 +131,33 @@ impl Bus {
             takes: message.spent(),
             answer: message.answer,
         })
+    }
+
+    /// What is to happen to message `number`, if anything; notes whom it meets.
+    fn upset(&mut self, number: u64, segments: &[Segment]) -> Option<Upset> {
+        let upset = self.upsets.due(number)?;
+        let (address, written) = match segments.first()? {
+            Segment::Write { address, bytes } => (*address, bytes.first().copied()),
+            Segment::Read { address, .. } => (*address, None),
+        };
+        let odd = SENSORS.iter().position(|a| *a == address);
+        let channel = (self.channels != 0).then(|| self.channels.trailing_zeros() as usize);
+        let sensor = odd.zip(channel).map(|(odd, channel)| 2 * channel + odd);
+        let register = match (sensor, written) {
+            (Some(sensor), None) => Some(self.sensors[sensor].pointer()),
+            (Some(_), written) => written,
+            (None, _) => None,
+        };
+        let reads = segments.iter().map(|segment| match segment {
+            Segment::Read { count, .. } => *count,
+            Segment::Write { .. } => 0,
+        });
+        self.upsets.met(Met {
+            sensor,
+            register,
+            reads: reads.sum(),
+        });
+        Some(upset)
     }
 
     /// One segment; false where nobody acknowledged the address.

@@ -71,7 +71,7 @@ fn devices(
     ));
     let (gripper_port, _) = probe::open_gripper(gripper.path(), model, &Person, interrupt)?;
     let parts = Parts {
-        glove: probe::open_glove(glove.path(), interrupt)?.port,
+        glove: probe::open_glove(glove.path(), interrupt)?.port.into(),
         gripper: gripper_port,
         model,
         line: host::lines::Settings::default(),

@@ -28,7 +28,7 @@ Nothing moves at start. The gripper follows while the clutch is closed: the spac
 `--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \
 by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
 pub struct Teleop {
-    /// The glove's serial port.
+    /// The glove's serial port, or `i2c:/dev/i2c-N`.
     #[arg(long, value_name = "PORT")]
     pub glove: PathBuf,
     /// The gripper's serial port, or `tcp:HOST[:PORT]`.

@@ -116,7 +116,7 @@ fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
 /// Why no frame came, once the glove's port is free.
 pub(super) fn no_frames(path: &Path, interrupt: &Interrupt) -> anyhow::Error {
     let what = format!(
-        "the glove's serial multiplexer on {} answers, but no sensor sent an orientation in {} s",
+        "the glove's multiplexer on {} answers, but no sensor sent an orientation in {} s",
         path.display(),
         FRAME_WAIT.as_secs()
     );

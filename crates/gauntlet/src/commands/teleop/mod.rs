@@ -62,7 +62,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         options.gripper.display(),
         words::activation(activation)
     ));
-    let glove = probe::open_glove(&options.glove, interrupt)?;
+    let glove = probe::open_glove_line(&options.glove, interrupt)?;
     if let Some(baud) = glove.switched {
         let why = match baud {
             9_600 => "as after power-on",
@@ -77,7 +77,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let log = options.log.clone();
     let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
     let parts = Parts {
-        glove: glove.port,
+        glove: glove.line,
         gripper,
         model,
         line,

@@ -3,16 +3,17 @@
 use std::time::{Duration, Instant};
 
 use bridge::Platform;
+use glove::bus::Bus;
 use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu;
-use glove::scan::{Config, Health, Scanner, State};
+use glove::scan::{BusScanner, Health, State};
 
 use super::bridge_chip::RESET_BAUD;
 use crate::clock::Clock;
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;
 use crate::lines::Pc;
-use crate::lines::port::Port;
+use crate::lines::port::Watch;
 
 /// All sensors are up 1.6 s after power-on, slower at 9600 baud.
 const BRING_UP: Duration = Duration::from_secs(6);
@@ -26,15 +27,19 @@ const STRAGGLERS: Duration = Duration::from_secs(2);
 const LOOK: glove::Duration = glove::Duration::from_millis(1);
 
 /// Brings the sensors up and looks which of them give orientations.
-pub fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrupt: &Interrupt) {
-    let config = Config {
-        baud,
-        mux,
-        ..Config::default()
+pub fn sensors<B: Bus>(
+    mut scanner: BusScanner<B>,
+    watch: Watch,
+    findings: &mut Findings,
+    interrupt: &Interrupt,
+) {
+    let mut pc = Pc::new(Clock::start(), [watch], interrupt.clone());
+    let baud = scanner.bus_mut().line_baud();
+    let layer = match baud {
+        Some(_) => "bridge",
+        None => "bus",
     };
-    let mut pc = Pc::new(Clock::start(), [port.watch()], interrupt.clone());
-    let mut scanner = Scanner::new(port, config);
-    let time = if baud == RESET_BAUD {
+    let time = if baud == Some(RESET_BAUD) {
         BRING_UP_SLOW
     } else {
         BRING_UP
@@ -44,7 +49,7 @@ pub fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrup
     let (mut frames, mut since) = (0_u32, Instant::now());
     let mut seen = [Seen::default(); SEGMENT_COUNT];
     // Not before each was brought up, or has failed: what it failed with is the finding.
-    let tried = |scanner: &Scanner<Port>| {
+    let tried = |scanner: &BusScanner<B>| {
         scanner.state() != State::Starting && !scanner.health().contains(&Health::Starting)
     };
     while (Instant::now() < end || !tried(&scanner) && Instant::now() < longest)
@@ -73,12 +78,16 @@ pub fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrup
     }
     if frames > 1 {
         let rate = f64::from(frames - 1) / since.elapsed().as_secs_f64();
-        findings.good("bridge", format!("{rate:.1} scans/s"));
+        findings.good(layer, format!("{rate:.1} scans/s"));
     }
     if matches!(scanner.state(), State::NoAnswer | State::Resync) {
+        let what = match baud {
+            Some(_) => "the serial bridge answers one question and then falls silent",
+            None => "the I2C port does not come back from a transaction",
+        };
         return findings.wrong(
-            "bridge",
-            "the serial bridge answers one question and then falls silent",
+            layer,
+            what,
             "cable and power of the glove; then unplug it and plug it in again",
         );
     }
