@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`lines`], [`probe`] | serial ports, Modbus TCP; does the right device answer there? |
 //! | [`session`] | a bridge that is driven and watched, in this process or on a chip |
+//! | [`scanning`] | a glove that is read by itself |
 //! | [`recording`] | the session log |
 //! | [`calibration`] | a glove calibrated from a recorded session |
 //! | [`training`] | maps of hands, and of other domains, from files |
@@ -34,6 +35,7 @@ pub mod probe;
 pub mod realtime;
 pub mod recording;
 pub mod report;
+pub mod scanning;
 pub mod session;
 pub mod stats;
 pub mod training;
