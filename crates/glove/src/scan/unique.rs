@@ -26,12 +26,6 @@ impl Ids {
 }
 
 impl<B> BusScanner<B> {
-    /// The sensors' unique ids as they were read first; `None` before that, for a sensor without one, and for one that was taken
-    /// for two.
-    pub fn ids(&self) -> [Option<UniqueId>; SEGMENT_COUNT] {
-        self.ids.known
-    }
-
     /// Whether the sensor that answers as `k` may be it. One that is taken for two puts both in doubt.
     ///
     /// # Errors
