@@ -105,13 +105,25 @@ impl Bench {
         config: rig::gripper::Config,
         driver: gripper::driver::Config,
     ) -> Self {
-        let clock = Clock::new();
-        let ahead = Arc::new(AtomicU64::new(0));
         let pose = Arc::new(Mutex::new([0.0; 25]));
         let glove = VirtualGlove::new(
             Box::new(moving(pose.clone())),
             rig::glove::Config::at_baud(115_200),
         );
+        Self::wearing(glove, pose, settings, image, config, driver)
+    }
+
+    /// With this glove; nobody moves it by `pose` who does not know it.
+    pub fn wearing(
+        glove: VirtualGlove,
+        pose: Arc<Mutex<[f32; 25]>>,
+        settings: Settings<4>,
+        image: Option<Vec<u8>>,
+        config: rig::gripper::Config,
+        driver: gripper::driver::Config,
+    ) -> Self {
+        let clock = Clock::new();
+        let ahead = Arc::new(AtomicU64::new(0));
         let glove_wire = MemoryWire::new(&clock, glove.clone(), 115_200);
         let gripper = VirtualGripper::new(config);
         let gripper_wire = MemoryWire::new(&clock, gripper.clone(), 115_200);
