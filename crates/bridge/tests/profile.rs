@@ -14,10 +14,16 @@ use rig::person::{Attitude, Person, Task};
 /// The angles of the little finger's base and of the hinge after it.
 const BESIDE_13: u32 = 0b1111 << 20;
 
-/// A person whose hand lies flat until the clutch is closed at 12 s, and works then.
+/// A person whose hand lies flat, works from 12 s on, and lies flat again from 30 s on.
 fn wearing(wearer: &Wearer) -> (Bench, Person) {
-    wearer.bench(&[(Task::Flat, 0.0), (Task::Use(Attitude::PalmDown), 12.0)])
+    wearer.bench(&[
+        (Task::Flat, 0.0),
+        (Task::Use(Attitude::PalmDown), 12.0),
+        (Task::Flat, FLAT_AGAIN as f64 * 1e-6),
+    ])
 }
+
+const FLAT_AGAIN: u64 = 30 * S;
 
 /// Calibrated by the profile and a flat pose, activated, following the hand.
 fn following(wearer: &Wearer) -> (Bench, Person) {
@@ -35,6 +41,13 @@ fn following(wearer: &Wearer) -> (Bench, Person) {
     });
     bench.follow();
     (bench, person)
+}
+
+fn is_not_calibrated(state: State) -> bool {
+    matches!(
+        state,
+        State::Holding(HoldReason::NotCalibrated) | State::SafeAction(HoldReason::NotCalibrated)
+    )
 }
 
 /// A flat pose, and how it ended.
@@ -163,53 +176,54 @@ fn when_the_hands_sensor_restarts_everything_waits_for_a_flat_pose() {
     assert_eq!(bench.app.telemetry().lacks(), Some(Lack::FlatPose));
     assert!(bench.told(Kind::HeadingLost { segment: 0 }));
     bench.release();
-    lie_flat(&mut bench, &wearer);
+    lie_flat(&mut bench);
     pose(&mut bench).expect("flat");
     bench.follow();
 }
 
-/// From now on the person's hand lies flat.
-fn lie_flat(bench: &mut Bench, wearer: &Wearer) {
-    let now = bench.now() as f64 * 1e-6;
-    let mut person = Person::new(wearer.traits.clone());
-    person.ask(Task::Flat, now);
-    bench.glove.set_pose(Box::new(person));
-    bench.run(3 * S);
+/// The hand lies flat again, for some seconds already.
+fn lie_flat(bench: &mut Bench) {
+    assert!(bench.now() < FLAT_AGAIN);
+    bench.run(FLAT_AGAIN + 4 * S - bench.now());
 }
 
 #[test]
 fn after_a_power_cut_of_the_glove_one_flat_pose_goes_on() {
-    let wearer = Wearer::new(1);
-    let (mut bench, _) = following(&wearer);
+    let (mut bench, _) = following(&Wearer::new(1));
     bench.run(5 * S);
     bench.glove.power(false, bench.clock.now());
     bench.run(S);
-    bench.release();
     bench.glove.power(true, bench.clock.now());
-    // A glove that is found at this speed again: the wire does not change its own.
-    lie_flat(&mut bench, &wearer);
-    bench.run(3 * S);
-    if bench.app.telemetry().frame_sequence == 0 {
-        return;
-    }
-    assert!(!bench.app.telemetry().calibration.is_calibrated);
+    bench.run(8 * S);
+    assert!(is_not_calibrated(bench.state()), "{:?}", bench.state());
+    assert_eq!(bench.app.telemetry().lacks(), Some(Lack::FlatPose));
+    bench.release();
+    lie_flat(&mut bench);
+    assert!(
+        !bench.app.telemetry().calibration.is_calibrated,
+        "not by itself"
+    );
+    pose(&mut bench).expect("flat");
+    bench.follow();
 }
 
 #[test]
 fn a_flat_pose_can_be_taken_back_and_what_restarted_since_stays_lost() {
-    let wearer = Wearer::new(1);
-    let (mut bench, _) = following(&wearer);
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.app.set_finds_flat(false);
     bench.release();
-    lie_flat(&mut bench, &wearer);
+    lie_flat(&mut bench);
     let before = bench.app.telemetry().sigma;
     pose(&mut bench).expect("flat");
+    let posed = bench.app.telemetry().sigma;
+    assert!(posed[13] < 0.9 * before[13], "the pose made it surer");
     bench.app.undo_calibration();
     assert_eq!(bench.app.telemetry().calibration.newest, Try::Undone);
     bench.run(100 * MS);
     assert!(bench.app.telemetry().calibration.is_calibrated);
     let after = bench.app.telemetry().sigma;
     for k in 0..SEGMENT_COUNT {
-        assert!((before[k] - after[k]).abs() < 0.02, "{k}");
+        assert!((before[k] - after[k]).abs() < 0.002, "{k}");
     }
     pose(&mut bench).expect("flat");
     bench.glove.reset_sensor(0, bench.clock.now());
@@ -217,6 +231,72 @@ fn a_flat_pose_can_be_taken_back_and_what_restarted_since_stays_lost() {
     bench.app.undo_calibration();
     bench.run(500 * MS);
     assert!(!bench.app.telemetry().calibration.is_calibrated);
+}
+
+#[test]
+fn a_flat_pose_is_found_while_the_gripper_follows_and_enters_over_a_second() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    let mut last = bench.app.telemetry().angles;
+    let (mut poses, mut fastest) = (bench.app.telemetry().poses, 0.0_f32);
+    let (mut entered, mut seen) = (None, 0);
+    while bench.now() < FLAT_AGAIN + 8 * S {
+        bench.step();
+        let telemetry = bench.app.telemetry();
+        if core::mem::replace(&mut seen, telemetry.frame_sequence) == telemetry.frame_sequence {
+            continue;
+        }
+        if core::mem::replace(&mut poses, telemetry.poses) != telemetry.poses {
+            entered = Some(bench.now());
+        }
+        if entered.is_some_and(|at| bench.now() < at + S) {
+            for (angle, last) in telemetry.angles.iter().zip(last) {
+                fastest = fastest.max((angle - last).abs().to_degrees());
+            }
+        }
+        last = telemetry.angles;
+    }
+    assert!(entered.is_some_and(|at| at > FLAT_AGAIN), "{entered:?}");
+    // Noise and tremor alone make 1.2°.
+    assert!(fastest < 2.0, "{fastest}° from one frame to the next");
+    let found = |event: &bridge::Event| matches!(event.kind, Kind::FlatPoseFound { .. });
+    assert!(bench.events.iter().any(found));
+    assert_eq!(bench.state(), State::Following);
+}
+
+#[test]
+fn a_sensor_that_jumped_is_held_until_a_flat_pose() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(2 * S);
+    bench.glove.slip(14, [0.0, 0.0, 1.0], 120.0);
+    bench.run(5 * S);
+    assert_eq!(bench.app.telemetry().distrusted, 1 << 14);
+    assert_eq!(bench.app.telemetry().held_joints, 0b11 << 23);
+    assert_eq!(bench.state(), State::Following);
+    bench.release();
+    bench.glove.slip(14, [0.0, 0.0, 1.0], -120.0);
+    lie_flat(&mut bench);
+    pose(&mut bench).expect("flat");
+    bench.run(S);
+    assert_eq!(bench.app.telemetry().distrusted, 0);
+    assert_eq!(bench.app.telemetry().held_joints, 0);
+}
+
+#[test]
+fn one_sensor_that_is_away_costs_its_joints_and_not_the_flat_pose() {
+    let wearer = Wearer::new(1);
+    let (mut bench, _) = wearing(&wearer);
+    bench
+        .app
+        .set_profile(Some(&wearer.profile()))
+        .expect("open");
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    pose(&mut bench).expect("flat");
+    bench.glove.unplug(6, true);
+    bench.run(S);
+    pose(&mut bench).expect("flat, as far as can be seen");
+    bench.glove.unplug(0, true);
+    bench.run(S);
+    assert_eq!(pose(&mut bench), Err(Refusal::Missing(1 << 6 | 1)));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use super::{FIST, Flash, hand_image};
 use bridge::app::expected;
 use bridge::event::{Event, Kind};
 use bridge::{App, Board, Config, Epoch, Instant, Platform, Settings, State, WeightsStore};
+use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
 use rig::flash::Power;
 use rig::glove::VirtualGlove;
@@ -110,12 +111,14 @@ impl Bench {
             Box::new(moving(pose.clone())),
             rig::glove::Config::at_baud(115_200),
         );
-        Self::wearing(glove, pose, settings, image, config, driver)
+        let keeps_baud = |scanner| scanner;
+        Self::wearing(glove, keeps_baud, pose, settings, image, config, driver)
     }
 
-    /// With this glove; nobody moves it by `pose` who does not know it.
+    /// With this glove, and a scanner so set up; nobody moves it by `pose` who does not know it.
     pub fn wearing(
         glove: VirtualGlove,
+        scanner: impl FnOnce(Scanner<MemoryWire>) -> Scanner<MemoryWire>,
         pose: Arc<Mutex<[f32; 25]>>,
         settings: Settings<4>,
         image: Option<Vec<u8>>,
@@ -140,7 +143,10 @@ impl Bench {
                 clock: clock.clone(),
                 ahead: Arc::clone(&ahead),
             },
-            glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
+            scanner(Scanner::new(
+                glove_wire.clone(),
+                glove::scan::Config::default(),
+            )),
             ThreeFinger::new(gripper_wire.clone(), driver),
             store,
             Config::new(settings).expect("in range"),

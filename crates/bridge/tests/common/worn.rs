@@ -5,6 +5,7 @@ use super::hand_image;
 use bridge::Settings;
 use glove::Instant;
 use glove::calibration::{Align, Bound, Finger, Reads, Session, Step};
+use glove::scan::Scanner;
 use rig::glove::{Honest, VirtualGlove};
 use rig::person::{Person, Task, Traits, guided};
 use std::sync::{Arc, Mutex};
@@ -97,6 +98,7 @@ impl Wearer {
         }
         let bench = Bench::wearing(
             self.glove(person.clone()),
+            Scanner::with_set_baud,
             Arc::new(Mutex::new([0.0; 25])),
             Settings::default(),
             Some(hand_image(1)),
