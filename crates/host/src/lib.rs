@@ -4,6 +4,7 @@
 //! |---|---|
 //! | [`lines`], [`probe`] | serial ports, Modbus TCP; does the right device answer there? |
 //! | [`session`] | a bridge that is driven and watched, in this process or on a chip |
+//! | [`scanning`] | a glove that is read by itself |
 //! | [`recording`] | the session log |
 //! | [`calibration`] | a glove calibrated by a person, or from a recorded session; its profile |
 //! | [`settings`] | what a person prefers, from a file |
@@ -35,6 +36,7 @@ pub mod probe;
 pub mod realtime;
 pub mod recording;
 pub mod report;
+pub mod scanning;
 pub mod session;
 pub mod settings;
 pub mod stats;
