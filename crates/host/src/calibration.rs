@@ -8,6 +8,7 @@ pub mod profile_file;
 pub mod recorded;
 pub mod replay;
 pub mod report;
+pub mod virtual_person;
 
 pub use guide::{Guide, Judged};
 pub use profile_file::{Found, Kept, ProfileStore};

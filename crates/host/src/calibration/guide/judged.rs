@@ -144,13 +144,6 @@ pub fn todo(doubt: &Doubt) -> (String, Option<Again>) {
     (words.to_owned(), again)
 }
 
-pub(super) fn side_word(side: Side) -> &'static str {
-    match side {
-        Side::Right => "right",
-        Side::Left => "left",
-    }
-}
-
 impl Judged {
     fn checks(&self) -> &Checks {
         &self.outcome.checks
