@@ -4,7 +4,8 @@ use anyhow::Result;
 use clap::{Parser, Subcommand};
 
 use crate::commands::{
-    bridge, demo, doctor, eval, export, flash, gripper, ports, reproduce, simulate, teleop, train,
+    bridge, demo, doctor, eval, export, flash, glove, gripper, ports, record, reproduce, simulate,
+    teleop, train,
 };
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
@@ -26,6 +27,7 @@ Start here:
 With hardware:
   gauntlet ports                                 which serial ports are there
   gauntlet doctor --gripper /dev/ttyUSB1 --glove /dev/ttyUSB0
+  gauntlet record --glove /dev/ttyUSB0 --out my_hand.csv
   gauntlet train --poses my_hand.csv --out model.safetensors
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors --calibrate-flat
 
@@ -61,6 +63,10 @@ pub enum Verb {
     Bridge(bridge::Bridge),
     /// List the serial ports of this machine.
     Ports(ports::Ports),
+    /// Record a hand from a glove, for `train`: no gripper and no model needed.
+    Record(record::Record),
+    /// Watch a glove by itself: the hand, the rates, each sensor.
+    Glove(glove::Glove),
     /// Read, activate and move a gripper at a bench.
     Gripper(gripper::Gripper),
     /// Find out which layer fails: port, line, unit, device.
@@ -98,6 +104,8 @@ impl Verb {
             Self::Flash(options) => options.json,
             Self::Bridge(options) => options.what.at().json,
             Self::Ports(options) => options.json,
+            Self::Record(options) => options.at.json,
+            Self::Glove(options) => options.json(),
             Self::Gripper(options) => options.verb.target().json,
             Self::Doctor(options) => options.json,
         }
@@ -137,6 +145,8 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Flash(options) => flash::run(&options, &interrupt()?),
         Verb::Bridge(options) => bridge::run(&options, &interrupt()?),
         Verb::Ports(options) => ports::run(&options),
+        Verb::Record(options) => record::run(&options, &interrupt()?),
+        Verb::Glove(options) => glove::run(&options, &interrupt()?),
         Verb::Gripper(options) => gripper::run(&options, &interrupt()?),
         Verb::Doctor(options) => doctor::run(&options, &interrupt()?),
     }

@@ -49,16 +49,16 @@ impl Kind {
     }
 }
 
-/// Refuses to write `path` where anything is there already, an empty file, too, or where its folder takes no file of a log's first
+/// Refuses to write `path`, which is to be `what` ("a log"), where anything is there already, an empty file, too, or where its folder takes no file of a log's first
 /// half second.
 ///
 /// # Errors
 /// A failure that names the path.
-pub fn check_new(path: &Path) -> Result<()> {
+pub fn check_new(path: &Path, what: &str) -> Result<()> {
     if std::fs::symlink_metadata(path).is_ok() {
         return Err(refusal(
             path,
-            "it exists, and a log is never written over anything",
+            &format!("it exists, and {what} is never written over anything"),
         ));
     }
     place_of_file(path)?;

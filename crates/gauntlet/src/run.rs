@@ -25,6 +25,7 @@ use host::session::record::{self, Feed, Records, Sort};
 use host::session::{Devices, Driver, Ending, Order, Session, Snapshot};
 use shown::Shown;
 
+pub use bringup::{ASK as ASK_FLAT, WAIT as FLAT_WAIT};
 pub use finished::Finished;
 
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.

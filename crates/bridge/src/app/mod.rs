@@ -12,6 +12,7 @@
 
 mod calibrating;
 mod tick;
+mod worn;
 
 use crate::board::Board;
 use crate::clutch::{Clutch, Epoch, HeartbeatRefusal, Position};
@@ -62,6 +63,8 @@ pub struct App<B: Board<X>, const X: usize> {
     stashed: Option<CycleEnd<B, X>>,
     gripper_error: Option<GripperError<B, X>>,
     sensors: Sensors,
+    /// How often each sensor had been started, as wired, when that was last looked at; `None` before and where the profile is new.
+    heard: Option<[u16; SEGMENT_COUNT]>,
     calibrating: Calibrating,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
@@ -87,7 +90,9 @@ struct Sensors {
     lost: u16,
     /// Told to show what no hand does.
     impossible: u16,
-    /// How often each had been started when the calibration was made; `None` without one.
+    /// Told to have lost their heading, which is looked for.
+    searching: u16,
+    /// How often each had been started, as wired, when the calibration of straight sensors was made; `None` without one.
     starts: Option<[u16; SEGMENT_COUNT]>,
 }
 
@@ -126,6 +131,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             stashed: None,
             gripper_error: None,
             sensors: Sensors::default(),
+            heard: None,
             calibrating: Calibrating::default(),
             weights: None,
             frame_at: None,

@@ -130,6 +130,9 @@ enum WireNotCalibrated {
     Bent { joint: u8, by: f32 },
     TooShort { still_ms: u16 },
     NothingBefore,
+    NoProfile,
+    OtherGlove,
+    Tilted { segment: u8, by: f32 },
 }
 
 #[derive(Serialize, Deserialize)]

@@ -5,6 +5,7 @@
 //! ("NaN").
 
 pub mod devices;
+pub mod gloves;
 pub mod maps;
 pub mod paper;
 pub mod runs;

@@ -143,6 +143,8 @@ impl Sensor {
 
     /// Eight bytes arrived that were asked for at `stamp`.
     pub fn take(&mut self, raw: [u8; imu::SAMPLE_BYTES], stamp: Instant, counters: &mut Counters) {
+        let (raw, mended) = imu::repair::repaired(raw);
+        counters.repaired = counters.repaired.wrapping_add(u32::from(mended));
         self.raw = Some(raw);
         self.pointer_set = true;
         match self.judge(&raw, stamp) {

@@ -5,6 +5,7 @@
 //! as many as like may look at. A glove that is unplugged is waited for; a thread that ends by a fault says so.
 
 mod bringup;
+mod hand;
 mod snapshot;
 mod worker;
 
@@ -25,6 +26,7 @@ use crate::lines::port::{BAUD, Port, Watch};
 use crate::realtime;
 
 pub use bringup::{BringUp, open};
+pub use hand::{Flat, Hand, Pose};
 pub use snapshot::{Sensor, Snapshot};
 
 /// Frames that wait to be taken: three seconds at the fastest line.

@@ -9,7 +9,7 @@ use bridge::calibration::{Refusal, Try};
 use bridge::protocol::message::{Health, Sample};
 
 use super::args::BridgeAt;
-use super::poses::Poses;
+use super::poses;
 use crate::outputs;
 use crate::results::{self, devices, runs};
 use crate::run::{Finished, Options, Run};
@@ -18,6 +18,7 @@ use host::chip::link::HostLink;
 use host::clock::Clock;
 use host::failure::{Failure, with_others};
 use host::interrupt::Interrupt;
+use host::recording::poses::PosesFile;
 use host::session::{Devices, OnChip, refused};
 
 pub(super) fn engage(
@@ -134,14 +135,14 @@ pub(super) fn log(
     interrupt: &Interrupt,
 ) -> Result<()> {
     let tell = Tell::new(at.json);
-    outputs::check_new(path)?;
+    outputs::check_new(path, "a log")?;
     let link = at.connect()?;
-    let (poses, samples) = Poses::create(path, interrupt)?;
+    let (file, samples) = PosesFile::create(path, interrupt, poses::rows())?;
     let driven = start(link, Some(samples), at.devices(), interrupt).map(|mut run| {
         let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
         (run.finish(), driven)
     });
-    let (rows, written) = poses.finish();
+    let (rows, written) = file.finish();
     let (finished, driven) = match (driven, &written) {
         (Ok(done), _) => done,
         (Err(first), Err(other)) => return Err(with_others(first, vec![format!("{other:#}")])),

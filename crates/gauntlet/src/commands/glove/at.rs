@@ -1,0 +1,113 @@
+//! A glove at a port of this computer: how it is named, opened and known.
+
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::Args;
+use glove::hand::Side;
+
+use crate::commands::teleop::Hand as WhichHand;
+use crate::tell::Tell;
+use host::clock::Clock;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::lines::list;
+use host::lines::port::BAUD;
+use host::next::Command;
+use host::scanning::{self, BringUp, Hand, Scanning, Settings};
+
+/// Where the glove is, and what is known of it.
+#[derive(Debug, Clone, Args)]
+pub struct GloveAt {
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT")]
+    pub glove: PathBuf,
+    /// Take the sensors as ideal: sewn on straight, with one heading. One flat pose then calibrates them. Virtual gloves only.
+    #[arg(long)]
+    pub ideal: bool,
+    /// Which hand wears the glove.
+    #[arg(long, value_enum, default_value_t = WhichHand::Right)]
+    pub hand: WhichHand,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A glove that is read, and the hand in it.
+pub(in crate::commands) struct Opened {
+    pub scanning: Scanning,
+    /// `None`: nobody knows how its sensors sit.
+    pub hand: Option<Hand>,
+    /// Sensors that give no orientation.
+    pub missing: usize,
+}
+
+impl GloveAt {
+    /// Opens it and says how it is: the port, the speed, sensors that are missing.
+    ///
+    /// # Errors
+    /// A failure that names the layer that fails, and what to try.
+    pub(in crate::commands) fn open(
+        &self,
+        tell: &Tell,
+        clock: Clock,
+        interrupt: &Interrupt,
+    ) -> Result<Opened> {
+        let place = self.glove.display();
+        if let Some(warning) = list::latency_warning(&self.glove) {
+            tell.say(format_args!("warning: {place}: {warning}"));
+        }
+        let BringUp {
+            scanning,
+            switched,
+            missing,
+        } = scanning::open(&self.glove, Settings::default(), clock, interrupt)?;
+        if let Some(baud) = switched {
+            let why = match baud {
+                9_600 => "as after power-on",
+                _ => "where it was left",
+            };
+            tell.say(format_args!(
+                "glove    {place}  spoke {baud} baud, {why}; switched it to {BAUD}"
+            ));
+        }
+        let good = scanning.snapshot().map_or(0, |seen| seen.good());
+        tell.say(format_args!(
+            "glove    {place}  answers, {good} of 16 sensors give orientations"
+        ));
+        for finding in &missing.0 {
+            tell.say(format_args!("warning: {}", finding.what));
+            if let Some(next) = &finding.next {
+                tell.say(format_args!("  try: {next}"));
+            }
+        }
+        let hand = self.ideal.then(|| Hand::ideal(self.side()));
+        Ok(Opened {
+            scanning,
+            hand,
+            missing: missing.faults(),
+        })
+    }
+
+    /// Which hand wears it.
+    pub(in crate::commands) fn side(&self) -> Side {
+        match self.hand {
+            WhichHand::Right => Side::Right,
+            WhichHand::Left => Side::Left,
+        }
+    }
+
+    /// What to do about it: the command that looks at it.
+    pub(in crate::commands) fn doctor(&self) -> Command {
+        Command::gauntlet("doctor").path("--glove", &self.glove)
+    }
+
+    /// It no longer sends frames.
+    pub(in crate::commands) fn silent(&self) -> Failure {
+        let what = format!(
+            "the glove on {} no longer sends frames",
+            self.glove.display()
+        );
+        Failure::new(what, self.doctor())
+    }
+}
