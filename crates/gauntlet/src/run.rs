@@ -331,6 +331,7 @@ impl Run {
     fn obey(&mut self, key: Key, options: &Options) {
         match key {
             Key::End => self.interrupt.ask(),
+            Key::Again => {}
             _ if !options.drives => {}
             Key::Clutch => {
                 if self.clutch.closed {
