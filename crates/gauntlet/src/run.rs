@@ -344,7 +344,7 @@ impl Run {
             // One that is not taken says no word of having begun; who pressed it presses it again.
             Key::Calibrate => {
                 self.session
-                    .order(Order::Calibrate(glove::timing::STILL_WAIT));
+                    .order(Order::CalibrateStraight(glove::timing::STILL_WAIT));
             }
         }
     }

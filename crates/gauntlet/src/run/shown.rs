@@ -343,6 +343,8 @@ mod tests {
             clutch,
             calibration: CalibrationState::default(),
             calibration_known: true,
+            profile: None,
+            headings: None,
             frame_sequence: 1,
             on_chip: false,
             frame: None,

@@ -94,6 +94,10 @@ impl Worker {
     where
         Pc: Board<X>,
     {
+        if let Some(profile) = self.orders.profile() {
+            // An event tells where it is refused.
+            let _ = app.set_profile(profile.as_ref());
+        }
         while let Some(order) = self.orders.next() {
             match order {
                 Order::Engage => self.epoch = Some(app.engage()),
@@ -108,7 +112,9 @@ impl Worker {
                     self.activation_asked = true;
                     app.activate();
                 }
-                Order::Calibrate(wait) => app.calibrate_flat_hand_within(wait),
+                Order::FlatPose(wait) => app.calibrate_flat_hand_within(wait),
+                Order::CalibrateStraight(wait) => app.calibrate_straight_within(wait),
+                Order::FindFlat(on) => app.set_finds_flat(on),
                 Order::UndoCalibration => app.undo_calibration(),
                 Order::Stop => return self.end(app),
             }
@@ -264,6 +270,10 @@ fn sort(kind: &Kind) -> Sort {
         Kind::GripperFault(fault) => *fault != gripper::Fault::None,
         Kind::SensorLost { .. }
         | Kind::SensorRestarted { .. }
+        | Kind::HeadingLost { .. }
+        | Kind::Unsure { .. }
+        | Kind::SensorSlipped { .. }
+        | Kind::ProfileMisfit(_)
         | Kind::Sensors(_)
         | Kind::AxisStands { .. }
         | Kind::Glove { answers: false }
