@@ -1,6 +1,6 @@
 //! `gauntlet calibrate --flat`: one flat pose with the profile there is. It shows whether a sensor has slipped since.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
@@ -12,7 +12,7 @@ use crate::results::{self, calibrations};
 use crate::tell::Tell;
 use host::calibration::guide::{Finding, FlatPose, PoseEnd, slipped};
 use host::calibration::virtual_person::VirtualPerson;
-use host::calibration::{Found, Kept, ProfileStore};
+use host::calibration::{Kept, profile_of};
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -32,13 +32,18 @@ pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> R
     let tell = Tell::new(options.json);
     let at = options.at(glove);
     let clock = Clock::start();
-    let mut opened = at.open(&tell, clock, interrupt)?;
-    let ids = opened
-        .scanning
+    let (mut scanning, _) = at.read(&tell, clock, interrupt)?;
+    let ids = scanning
         .snapshot()
         .map(|seen| seen.ids())
         .unwrap_or_default();
-    let (path, kept) = profile(options, glove, &ids)?;
+    let (path, kept) = profile_of(at.profile.as_deref(), &ids)?.map_err(|why| {
+        let calibrate = Command::gauntlet("calibrate").path("--glove", glove);
+        Failure::new(
+            format!("the glove on {}: {why}", glove.display()),
+            calibrate,
+        )
+    })?;
     tell.say(format_args!(
         "profile    {}  of {}",
         path.display(),
@@ -47,14 +52,14 @@ pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> R
     let person = VirtualPerson::at(glove);
     let end = take(
         &kept,
-        &mut opened.scanning,
+        &mut scanning,
         clock,
         person.as_ref(),
         &tell,
         interrupt,
     );
     // What ended it before is told.
-    let _ = opened.scanning.stop();
+    let _ = scanning.stop();
     if let Some(person) = &person {
         person.let_go();
     }
@@ -85,7 +90,7 @@ pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> R
         let result = calibrations::FlatPose {
             place: glove.display().to_string(),
             profile: path.display().to_string(),
-            calibrated: kept.calibrated,
+            calibrated: kept.calibrated.clone(),
             findings,
             failure,
         };
@@ -104,36 +109,6 @@ fn tilted(segment: u8, by: f32) -> Finding {
         what: format!("{} lies {:.0}° tilted against how it was calibrated", name.unwrap_or("?"), by.to_degrees()),
         todo: "the same again with that finger straight; if it stays, its sensor slipped: press it on and calibrate anew".to_owned(),
     }
-}
-
-/// The glove's profile: what was named, if it fits, else what its ids find.
-fn profile(
-    options: &Calibrate,
-    glove: &Path,
-    ids: &[Option<glove::imu::UniqueId>; glove::hand::SEGMENT_COUNT],
-) -> Result<(PathBuf, Kept)> {
-    let calibrate = || Command::gauntlet("calibrate").path("--glove", glove);
-    if let Some(path) = &options.profile {
-        let kept = Kept::read(path)?;
-        return match kept.bound.fits(ids) {
-            Ok(()) => Ok((path.clone(), kept)),
-            Err(misfit) => {
-                Err(Failure::new(format!("{}: {misfit}", path.display()), calibrate()).into())
-            }
-        };
-    }
-    let store = ProfileStore::usual()?;
-    let place = glove.display();
-    let what = match store.find(ids)? {
-        Found::Fits(path, kept) => return Ok((path, *kept)),
-        Found::Nearly(path, misfit) => format!("{}: {misfit}", path.display()),
-        Found::Untold(misfit) => format!("the glove on {place}: {misfit}"),
-        Found::Nothing => format!(
-            "no profile in {} is of the glove on {place}",
-            store.folder().display()
-        ),
-    };
-    Err(Failure::new(what, calibrate()).into())
 }
 
 fn take(

@@ -90,6 +90,7 @@ impl Calibrate {
     fn at(&self, glove: &Path) -> GloveAt {
         GloveAt {
             glove: glove.to_owned(),
+            profile: self.profile.clone(),
             ideal: false,
             hand: self.hand.unwrap_or(WhichHand::Right),
             json: self.json,
@@ -139,16 +140,16 @@ fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()
     }
     let at = options.at(glove);
     let clock = Clock::start();
-    let opened = at.open(&tell, clock, interrupt)?;
-    if opened.missing > 0 {
+    let (scanning, missing) = at.read(&tell, clock, interrupt)?;
+    if missing > 0 {
         let what = format!(
             "the glove on {} lacks sensors, and a calibration needs all 16",
             glove.display()
         );
         return Err(Failure::new(what, at.doctor()).into());
     }
-    let ids = ids(opened.scanning.snapshot().as_ref(), &at)?;
-    let mut session = Session::new(opened.scanning, clock, options, glove);
+    let ids = ids(scanning.snapshot().as_ref(), &at)?;
+    let mut session = Session::new(scanning, clock, options, glove);
     let led = session.lead(&tell, interrupt);
     let done = session.finish();
     let mut kept = None;
