@@ -438,6 +438,7 @@ impl Worker {
             calibration_known: self.calibration_known,
             profile: self.devices.profile(),
             headings: self.devices.headings(),
+            ids: [None; glove::hand::SEGMENT_COUNT],
             frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
             on_chip: true,
             frame: None,

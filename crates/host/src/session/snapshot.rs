@@ -5,6 +5,7 @@ use bridge::clutch::Position;
 use bridge::{State, Telemetry};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::headings::PoseReport;
+use glove::imu::UniqueId;
 use glove::scan;
 use gripper::{Activation, Contact, Fault, Instant};
 
@@ -101,6 +102,8 @@ pub struct Snapshot {
     pub profile: Option<ProfileState>,
     /// What is known of the headings; `None` without a profile, and where the bridge does not say.
     pub headings: Option<Headings>,
+    /// The sensors' unique ids, as they are wired, as far as they were read; none from a chip.
+    pub ids: [Option<UniqueId>; SEGMENT_COUNT],
     /// Counts frames taken; 0: none yet.
     pub frame_sequence: u32,
     /// Whether the bridge runs on a chip, of which no events come.
@@ -197,6 +200,7 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
                 poses: now.poses,
                 pose: now.pose,
             }),
+            ids: [None; SEGMENT_COUNT],
             frame_sequence: now.frame_sequence,
             on_chip: false,
             frame: now.frame,
@@ -232,6 +236,7 @@ impl Snapshot {
             calibration_known: true,
             profile: Some(ProfileState::default()),
             headings: None,
+            ids: [None; SEGMENT_COUNT],
             frame_sequence: 1,
             on_chip: false,
             frame: None,

@@ -208,7 +208,11 @@ impl Worker {
         let useless = telemetry.frame_sequence > 0 && !telemetry.angles_valid;
         said.totals
             .here(&telemetry.counters, telemetry.now, self.scheduling);
-        said.say(Snapshot::from(&telemetry), useless);
+        let seen = Snapshot {
+            ids: app.scanner_mut().ids(),
+            ..Snapshot::from(&telemetry)
+        };
+        said.say(seen, useless);
     }
 
     fn command_record<const X: usize>(&self, sent: &Sent<X>) -> Command {
