@@ -6,13 +6,56 @@ use glove::hand::flat;
 /// Whether the glove is calibrated, and how the newest try ended.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct CalibrationState {
-    /// The calibration in use is worth something: one was taken, and neither the `hand` sensor nor two others have restarted
-    /// since. Without it nothing moves.
+    /// The angles are worth something: a calibration or, by the glove's profile, a flat pose was taken, and neither the `hand` sensor nor two
+    /// others have lost their heading since. Without it nothing moves.
     pub is_calibrated: bool,
     /// The newest try.
     pub newest: Try,
     /// Counts tries that ended, whichever way. Wraps.
     pub ended: u16,
+}
+
+/// Whether the glove's profile is there.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct ProfileState {
+    /// There is one.
+    pub is_there: bool,
+    /// It was made with the sensors that answer.
+    pub fits: bool,
+}
+
+/// What a glove that is not calibrated lacks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lack {
+    /// A profile.
+    Profile,
+    /// A profile of its own: the one there is another glove's, or no sensor has answered yet.
+    OwnProfile,
+    /// A flat pose.
+    FlatPose,
+}
+
+impl ProfileState {
+    /// What a glove in this state lacks, if it is not calibrated.
+    pub fn lacks(self) -> Lack {
+        match self {
+            Self {
+                is_there: false, ..
+            } => Lack::Profile,
+            Self { fits: false, .. } => Lack::OwnProfile,
+            Self { fits: true, .. } => Lack::FlatPose,
+        }
+    }
+}
+
+impl core::fmt::Display for Lack {
+    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
+        f.write_str(match self {
+            Self::Profile => "there is no profile of this glove: `gauntlet calibrate` makes one",
+            Self::OwnProfile => "the profile is of another glove, or no sensor answers: `gauntlet calibrate` makes one of this glove",
+            Self::FlatPose => "the headings are not known: open the clutch, lay the hand flat and hold it for two seconds",
+        })
+    }
 }
 
 /// A try to calibrate on the flat hand.
@@ -61,6 +104,17 @@ pub enum Refusal {
     },
     /// There is no calibration to go back to.
     NothingBefore,
+    /// There is no profile: one flat pose alone says nothing of a real glove.
+    NoProfile,
+    /// The profile is another glove's.
+    OtherGlove,
+    /// A segment lies tilted: the hand is not flat, or the sensor slipped.
+    Tilted {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: u8,
+        /// By how much, radians.
+        by: f32,
+    },
 }
 
 impl From<flat::Refusal> for Refusal {
@@ -82,6 +136,21 @@ impl core::fmt::Display for Refusal {
         let glove = match *self {
             Self::Engaged => return f.write_str("the clutch is closed: release it first"),
             Self::NothingBefore => return f.write_str("there is no calibration to go back to"),
+            Self::NoProfile => return write!(f, "{}", Lack::Profile),
+            Self::OtherGlove => {
+                return f.write_str(
+                    "the profile is of another glove: `gauntlet calibrate` makes one of this",
+                );
+            }
+            Self::Tilted { segment, by } => {
+                let name = glove::hand::SEGMENT_NAMES.get(usize::from(segment));
+                return write!(
+                    f,
+                    "the hand is not flat, or a sensor slipped: {} is tilted by {:.0}°",
+                    name.unwrap_or(&"?"),
+                    by * (180.0 / core::f32::consts::PI)
+                );
+            }
             Self::NoFrames => flat::Refusal::NoFrames,
             Self::Missing(segments) => flat::Refusal::Missing { segments },
             Self::Moving { segment, by } => flat::Refusal::Moving { segment, by },

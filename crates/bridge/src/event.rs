@@ -2,6 +2,7 @@
 
 use crate::calibration::Try;
 use crate::{Duration, Instant, State};
+use glove::calibration::Misfit;
 use glove::scan::Finding;
 use gripper::registers::Fault;
 
@@ -44,6 +45,46 @@ pub enum Kind {
     },
     /// What the scanner found out about the sensors.
     Sensors(Finding),
+    /// The glove has another profile, or none any more.
+    Profile {
+        /// There is one.
+        is_there: bool,
+    },
+    /// The profile was made with the sensors that answer.
+    ProfileFits,
+    /// The profile is not this glove's (sensors as they are wired).
+    ProfileMisfit(Misfit),
+    /// A sensor of the profile's started anew: the joints beside it are held until its heading is found again, the `hand`'s until a
+    /// flat pose.
+    HeadingLost {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// … and it was found.
+    HeadingFound {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// The heading across the joint between this segment and its parent is not sure enough: it is held.
+    Unsure {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// … it is sure enough again.
+    Sure {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
+    /// A flat pose was found while the hand worked.
+    FlatPoseFound {
+        /// How far the heading that was farthest off was off, radians.
+        off: f32,
+    },
+    /// By a flat pose this sensor seems to have slipped on its segment.
+    SensorSlipped {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
     /// Frames come from the glove (or no longer do).
     Glove {
         /// Whether they come.
@@ -90,6 +131,8 @@ pub enum Kind {
 pub enum Request {
     /// Activating the gripper while it follows the hand.
     Activate,
+    /// Another profile.
+    Profile,
 }
 
 impl core::fmt::Display for Kind {
@@ -118,6 +161,43 @@ impl core::fmt::Display for Kind {
                 )
             }
             Kind::Sensors(finding) => write!(f, "{finding}"),
+            Kind::Profile { is_there: true } => f.write_str("the glove has a profile"),
+            Kind::Profile { is_there: false } => f.write_str("the glove has no profile"),
+            Kind::ProfileFits => f.write_str("the profile is this glove's"),
+            Kind::ProfileMisfit(misfit) => write!(f, "{misfit}"),
+            Kind::HeadingLost { segment: 0 } => f.write_str(
+                "sensor hand restarted, its heading is lost: open the clutch, lay the hand flat",
+            ),
+            Kind::HeadingLost { segment } => write!(
+                f,
+                "sensor {} restarted: the joints beside it are held until its heading is found again",
+                sensor(segment)
+            ),
+            Kind::HeadingFound { segment } => {
+                write!(
+                    f,
+                    "the heading of sensor {} is found again",
+                    sensor(segment)
+                )
+            }
+            Kind::Unsure { segment } => write!(
+                f,
+                "the heading of {} is not sure enough: its joint is held until a flat pose or until its hinge shows it",
+                sensor(segment)
+            ),
+            Kind::Sure { segment } => {
+                write!(f, "the heading of {} is sure enough again", sensor(segment))
+            }
+            Kind::FlatPoseFound { off } => write!(
+                f,
+                "a flat hand was seen: headings were off by up to {:.1}°",
+                off.to_degrees()
+            ),
+            Kind::SensorSlipped { segment } => write!(
+                f,
+                "sensor {} seems to have slipped: check its seat, then calibrate again",
+                sensor(segment)
+            ),
             Kind::Glove { answers: true } => f.write_str("the glove sends frames"),
             Kind::Glove { answers: false } => {
                 f.write_str("the glove sends no frames: check its cable and power")
@@ -157,6 +237,9 @@ impl core::fmt::Display for Kind {
             Kind::Refused(Request::Activate) => f.write_str(
                 "not activated while the gripper follows the hand: release the clutch first",
             ),
+            Kind::Refused(Request::Profile) => {
+                f.write_str("the profile stays as it is: release the clutch first")
+            }
         }
     }
 }

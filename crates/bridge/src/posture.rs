@@ -1,12 +1,22 @@
 //! From a frame of the glove to joint angles, with the joints beside a lost sensor, or one that shows what no hand does, held
 //! (rule 4).
+//!
+//! Two ways: a *profile* ([`glove::calibration::Profile`]) with headings that are kept ([`glove::headings`]), for a real glove; and a
+//! calibration on one flat hand that takes mounting and heading as one, for sensors that sit straight and share a heading.
+//!
+//! **By segment.** Frames here are by segment: sample `k` is of the sensor that sits on segment `k`, wherever it is wired
+//! ([`Posture::placed`]). So is every mask.
 
 mod back;
+mod profile;
+mod worn;
 
 use crate::{HoldReason, Instant};
 use back::Back;
 use glove::hand::{self, Calibration, JOINT_COUNT, SEGMENT_COUNT, Side, beyond};
+use glove::headings::{Known, PoseReport};
 use glove::scan::{Frame, Health};
+use worn::Worn;
 
 /// What a frame says about the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -17,15 +27,40 @@ pub struct Reading {
     pub missing: u16,
     /// Joints that repeat their last good angle (bit j: joint j).
     pub held: u32,
-    /// Stamp of the oldest sample used.
+    /// Stamp of the oldest sample used; with a profile the scan's beginning, to which all are brought.
     pub stamp: Instant,
+    /// A flat pose was found in this frame and taken.
+    pub pose: Option<PoseReport>,
+}
+
+/// Where joint angles come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Way {
+    /// From a calibration on a flat hand, or without any.
+    Straight,
+    /// From the profile.
+    Profile,
+}
+
+/// What the angles rest on, to go back to.
+#[derive(Debug, Clone)]
+#[allow(clippy::large_enum_variant, reason = "there is one, and no allocator")]
+pub enum Basis {
+    /// A calibration on a flat hand, or none.
+    Straight(Option<Calibration>),
+    /// The headings of the profile's sensors, and how often each had been started.
+    Headings(Known, [u16; SEGMENT_COUNT]),
 }
 
 /// Remembers the last good angle of every joint.
 #[derive(Debug, Clone)]
 pub struct Posture {
     side: Side,
+    way: Way,
     calibration: Option<Calibration>,
+    worn: Option<Worn>,
+    /// Flat poses are found while the hand works.
+    finds_flat: bool,
     angles: [f32; JOINT_COUNT],
     /// Joints that have been measured since the calibration.
     known: u32,
@@ -43,7 +78,10 @@ impl Posture {
     pub fn new(side: Side, calibration: Option<Calibration>) -> Self {
         Self {
             side,
+            way: Way::Straight,
             calibration,
+            worn: None,
+            finds_flat: true,
             angles: [0.0; JOINT_COUNT],
             known: 0,
             distrusted: 0,
@@ -53,15 +91,24 @@ impl Posture {
         }
     }
 
-    /// The calibration in use; without one, angles are those of sensors that sit straight.
+    /// The calibration on a flat hand that is in use; without one, and without a profile, angles are those of sensors that sit
+    /// straight.
     pub fn calibration(&self) -> Option<&Calibration> {
-        self.calibration.as_ref()
+        self.calibration
+            .as_ref()
+            .filter(|_| self.way == Way::Straight)
     }
 
-    /// Whether the calibration is worth something: there is one, and neither the `hand` sensor nor two others have lost their
-    /// heading since.
+    /// Whether the angles are worth something: what they rest on is there, and neither the `hand` sensor nor two others have
+    /// lost their heading since.
     pub fn is_calibrated(&self) -> bool {
-        self.calibration.is_some() && self.distrusted & 1 == 0 && self.distrusted.count_ones() < 2
+        let astray = match (self.way, &self.worn) {
+            (Way::Profile, Some(worn)) if worn.fit().is_ok() => worn.astray(),
+            (Way::Straight, _) if self.calibration.is_some() => 0,
+            _ => return false,
+        };
+        let lost = self.distrusted | astray;
+        lost & 1 == 0 && lost.count_ones() < 2
     }
 
     /// The last good angle of every joint, radians; zero where none was measured.
@@ -69,16 +116,27 @@ impl Posture {
         &self.angles
     }
 
-    /// Takes another calibration. Angles measured under the old one do not count, and every sensor is trusted again.
+    /// Takes another calibration on a flat hand. Angles measured under the old one do not count, and every sensor is trusted again.
     pub fn calibrate(&mut self, calibration: Option<Calibration>) {
-        *self = Self::new(self.side, calibration);
+        self.way = Way::Straight;
+        self.calibration = calibration;
+        self.forget_angles();
+        self.distrusted = 0;
     }
 
-    /// The other hand. Angles measured so far do not count; what is not trusted stays so.
+    fn forget_angles(&mut self) {
+        (self.angles, self.known) = ([0.0; JOINT_COUNT], 0);
+        (self.beyond, self.impossible) = (0, 0);
+        self.back = Back::new();
+    }
+
+    /// The other hand. Angles measured so far do not count; what is not trusted stays so. A profile says for itself which hand
+    /// it is of.
     pub fn set_side(&mut self, side: Side) {
-        let distrusted = self.distrusted;
-        *self = Self::new(side, self.calibration);
-        self.distrusted = distrusted;
+        self.side = side;
+        if self.way == Way::Straight {
+            self.forget_angles();
+        }
     }
 
     /// Segments whose samples are not used although they look good (bit k: segment k).
@@ -92,11 +150,16 @@ impl Posture {
         self.impossible
     }
 
-    /// Does not use a segment's samples until the next calibration. Returns whether that is new.
-    pub fn distrust(&mut self, segment: usize) -> bool {
+    /// Does not use a segment's samples until the next calibration or flat pose. Returns whether that is new.
+    ///
+    /// With a profile, too: who jumped may have turned on its segment, and no hinge shows that.
+    pub fn distrust(&mut self, segment: usize, now: Instant) -> bool {
         let bit = bit(segment);
         let new = self.distrusted & bit == 0;
         self.distrusted |= bit;
+        if new && let Some(worn) = &mut self.worn {
+            worn.lose(segment, now);
+        }
         new
     }
 
@@ -105,12 +168,29 @@ impl Posture {
     /// With one sensor missing or impossible (not the `hand`), the joints on both sides of its segment keep their last good
     /// angle; when it is back after a while they go gently to what it says.
     ///
+    /// With a profile the joints are held, too, whose heading is not known or not sure.
+    ///
     /// # Errors
-    /// - `NotCalibrated`: the `hand` sensor or two others have lost their heading since the calibration.
+    /// - `NotCalibrated`: there is a profile and no heading yet or it is another glove's; or the `hand` sensor or two others have lost
+    ///   their heading.
     /// - `SensorsLost`: the `hand` sensor or two others are missing or impossible, or one is and a joint beside it was never
     ///   measured.
     /// - `InputRefused`: an angle is not finite, which checked samples cannot give.
     pub fn read(&mut self, frame: &Frame) -> Result<Reading, HoldReason> {
+        let finds = self.finds_flat && self.is_calibrated();
+        let taken = match &mut self.worn {
+            Some(worn) if self.way == Way::Profile || worn.is_posing() => {
+                Some(worn.take(frame, self.distrusted, finds))
+            }
+            _ => None,
+        };
+        match (self.way, taken) {
+            (Way::Profile, Some((missing, reading))) => self.read_profile(missing, &reading),
+            _ => self.read_straight(frame),
+        }
+    }
+
+    fn read_straight(&mut self, frame: &Frame) -> Result<Reading, HoldReason> {
         if self.calibration.is_some() && !self.is_calibrated() {
             return Err(HoldReason::NotCalibrated);
         }
@@ -122,12 +202,23 @@ impl Posture {
         let measured = hand::joint_angles(&orientations, calibration, self.side);
         if self.calibration.is_some() {
             let excess = beyond::excess(&orientations, calibration, self.side, &measured);
-            self.judge(&excess, missing);
+            self.judge(&excess, missing, 0);
         }
         let missing = missing | self.impossible;
         let held = self.check(missing)?;
         let stamp = oldest(frame, missing).ok_or(HoldReason::SensorsLost(missing))?;
-        let angles = self.back.blend(stamp, held, &self.angles, &measured);
+        self.settle(&measured, missing, held, stamp, None)
+    }
+
+    fn settle(
+        &mut self,
+        measured: &[f32; JOINT_COUNT],
+        missing: u16,
+        held: u32,
+        stamp: Instant,
+        pose: Option<PoseReport>,
+    ) -> Result<Reading, HoldReason> {
+        let angles = self.back.blend(stamp, held, &self.angles, measured);
         if !angles.iter().all(|angle: &f32| angle.is_finite()) {
             return Err(HoldReason::InputRefused);
         }
@@ -138,6 +229,7 @@ impl Posture {
             missing,
             held,
             stamp,
+            pose,
         })
     }
 
@@ -154,11 +246,12 @@ impl Posture {
         Ok(held)
     }
 
-    /// Which sensors show what no hand does, of those that are there.
-    fn judge(&mut self, excess: &[f32; SEGMENT_COUNT], missing: u16) {
+    /// Which sensors show what no hand does, of those that are there. `unseen`: joints that show nothing (bit k: the one between
+    /// segment k and its parent).
+    fn judge(&mut self, excess: &[f32; SEGMENT_COUNT], missing: u16, unseen: u16) {
         for (segment, excess) in excess.iter().enumerate() {
             let parent = hand::parent(segment).unwrap_or(0);
-            let seen = missing & (bit(segment) | bit(parent)) == 0;
+            let seen = missing & (bit(segment) | bit(parent)) == 0 && unseen & bit(segment) == 0;
             let limit = if self.beyond & bit(segment) == 0 {
                 beyond::FAR
             } else {

@@ -1,10 +1,11 @@
 //! What the bridge knows at the end of a step, in one plain struct.
 
-use crate::calibration::CalibrationState;
+use crate::calibration::{CalibrationState, Lack, ProfileState};
 use crate::clutch::Position;
 use crate::posture::{self, Reading};
 use crate::{Duration, HoldReason, Instant, State};
-use glove::hand::JOINT_COUNT;
+use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
+use glove::headings::PoseReport;
 use glove::scan::{self, Frame};
 use gripper::{Motion, Status};
 
@@ -22,9 +23,24 @@ pub struct Telemetry<const X: usize> {
     pub clutch: Position,
     /// Whether the glove is calibrated, or how the newest try ended.
     pub calibration: CalibrationState,
+    /// Whether the glove's profile is there.
+    pub profile: ProfileState,
+    /// With a profile, how sure the heading across the joint between each segment and its parent is: standard deviation, radians;
+    /// infinite where there is none.
+    pub sigma: [f32; SEGMENT_COUNT],
+    /// … and how fast it drifts, radians a second.
+    pub drift: [f32; SEGMENT_COUNT],
+    /// Joints that are held because their heading is not sure enough (bit k: the one between segment k and its parent).
+    pub degraded: u16,
+    /// Joints without a heading (bit k).
+    pub unknown: u16,
+    /// The newest flat pose that was taken.
+    pub pose: Option<PoseReport>,
+    /// Counts flat poses taken. Wraps.
+    pub poses: u16,
     /// Counts frames taken; 0: none yet. Wraps, like the other two.
     pub frame_sequence: u32,
-    /// The newest frame.
+    /// The newest frame, by segment: each sample where its sensor sits.
     pub frame: Option<Frame>,
     /// Joint angles of the newest frame that gave any, radians; joints beside a lost sensor repeat their last good angle.
     pub angles: [f32; JOINT_COUNT],
@@ -121,6 +137,13 @@ impl<const X: usize> Telemetry<X> {
             state: State::Idle,
             clutch: Position::Open,
             calibration: CalibrationState::default(),
+            profile: ProfileState::default(),
+            sigma: [0.0; SEGMENT_COUNT],
+            drift: [0.0; SEGMENT_COUNT],
+            degraded: 0,
+            unknown: 0,
+            pose: None,
+            poses: 0,
             frame_sequence: 0,
             frame: None,
             angles: [0.0; JOINT_COUNT],
@@ -143,6 +166,23 @@ impl<const X: usize> Telemetry<X> {
             glove_state,
             counters: Counters::default(),
         }
+    }
+
+    /// What the glove lacks, if it is not calibrated.
+    pub fn lacks(&self) -> Option<Lack> {
+        (!self.calibration.is_calibrated).then(|| self.profile.lacks())
+    }
+
+    pub(crate) fn take_pose(&mut self, report: &PoseReport) {
+        self.pose = Some(*report);
+        self.poses = self.poses.wrapping_add(1);
+    }
+
+    /// Another profile: what was known by the old one counts for nothing.
+    pub(crate) fn forget_glove(&mut self) {
+        (self.frame, self.angles_valid, self.pose) = (None, false, None);
+        (self.sigma, self.drift) = ([0.0; SEGMENT_COUNT], [0.0; SEGMENT_COUNT]);
+        (self.degraded, self.unknown) = (0, 0);
     }
 
     pub(crate) fn take_frame(&mut self, frame: &Frame) {

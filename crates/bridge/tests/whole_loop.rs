@@ -356,7 +356,7 @@ fn a_flat_hand_taken_as_calibration_makes_every_angle_zero() {
     bench.set_pose(crooked);
     bench.run(S);
     assert!((bench.app.telemetry().angles[5] - 0.2).abs() < 0.01);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.until("calibrated", |bench| {
         bench.told(Kind::Calibration(Try::Taken))
     });
@@ -377,7 +377,7 @@ fn a_calibration_without_a_complete_frame_fails_in_time_and_says_which_sensor() 
     bench.ready();
     bench.glove.unplug(7, true);
     bench.run(S);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     let start = bench.now();
     bench.until("given up", |bench| {
         bench.told(Kind::Calibration(Try::Refused(Refusal::Missing(1 << 7))))
@@ -389,7 +389,7 @@ fn a_calibration_without_a_complete_frame_fails_in_time_and_says_which_sensor() 
 fn a_sensor_that_restarts_after_the_calibration_is_not_believed_until_the_next_one() {
     let mut bench = Bench::new(Settings::default());
     bench.ready();
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.until("calibrated", |bench| {
         bench.told(Kind::Calibration(Try::Taken))
     });
@@ -403,7 +403,7 @@ fn a_sensor_that_restarts_after_the_calibration_is_not_believed_until_the_next_o
     assert_eq!(bench.app.telemetry().held_joints, 0b11 << 8);
     bench.release();
     bench.run(100 * MS);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.run(2 * S);
     assert_eq!(bench.app.telemetry().held_joints, 0);
 }
@@ -423,13 +423,13 @@ fn a_glove_that_is_not_calibrated_moves_nothing_until_a_flat_hand_was_taken() {
     assert_eq!(bench.state(), State::Holding(HoldReason::NotCalibrated));
     assert_eq!(bench.gripper.motions(), motions);
     // Calibrating comes before engaging.
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.run(2 * S);
     assert!(bench.told(Kind::Calibration(Try::Refused(Refusal::Engaged))));
     assert_eq!(bench.state(), State::Holding(HoldReason::NotCalibrated));
     bench.release();
     bench.run(20 * MS);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.until("calibrated", |bench| {
         bench.told(Kind::Calibration(Try::Taken))
     });
@@ -443,7 +443,7 @@ fn a_fist_is_not_taken_for_a_flat_hand() {
     let before = *bench.app.calibration().expect("one");
     bench.set_pose(FIST);
     bench.run(S);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.run(3 * S);
     let newest = bench.app.telemetry().calibration.newest;
     assert!(
@@ -468,7 +468,7 @@ fn a_calibration_can_be_taken_back_once() {
         },
     ));
     bench.run(S);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.run(2 * S);
     assert_eq!(bench.app.telemetry().calibration.newest, Try::Taken);
     assert_ne!(bench.app.calibration(), Some(&before));
@@ -488,7 +488,7 @@ fn a_calibration_taken_back_is_worth_no_more_than_it_was_and_nothing_after_a_res
     bench.glove.reset_sensor(0, now);
     bench.run(5 * S);
     assert!(!bench.app.telemetry().calibration.is_calibrated);
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     bench.run(2 * S);
     assert!(bench.app.telemetry().calibration.is_calibrated);
     bench.app.undo_calibration();
@@ -507,7 +507,7 @@ fn a_hand_that_bends_by_a_try_at_a_time_is_not_taken_for_flat() {
     for (pip, taken) in [(0.5, true), (1.0, false), (1.45, false)] {
         bench.set_pose(bent(pip));
         bench.run(S);
-        bench.app.calibrate_flat_hand();
+        bench.app.calibrate_straight();
         bench.run(3 * S);
         let newest = bench.app.telemetry().calibration.newest;
         assert_eq!(newest == Try::Taken, taken, "{pip}: {newest:?}");
@@ -611,7 +611,7 @@ fn requests_that_need_an_open_clutch_are_refused_while_it_is_closed() {
     use bridge::event::Request;
     let mut bench = following();
     bench.app.activate();
-    bench.app.calibrate_flat_hand();
+    bench.app.calibrate_straight();
     let config = *bench.app.config();
     assert_eq!(bench.app.set_config(config), Err(config));
     bench.run(100 * MS);

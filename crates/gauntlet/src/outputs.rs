@@ -25,6 +25,8 @@ pub enum Kind {
     Log,
     /// A weights image.
     Image,
+    /// A glove's profile, TOML.
+    Profile,
 }
 
 impl Kind {
@@ -34,6 +36,7 @@ impl Kind {
             Self::Checkpoint => "a checkpoint",
             Self::Log => "an MCAP file",
             Self::Image => "a weights image",
+            Self::Profile => "a glove's profile",
         }
     }
 
@@ -45,20 +48,21 @@ impl Kind {
             Self::Checkpoint => is_safetensors(start, length) && !names(start, MODEL),
             Self::Log => start.starts_with(b"\x89MCAP0\r\n"),
             Self::Image => start.starts_with(&hae::image::MAGIC),
+            Self::Profile => start.starts_with(PROFILE),
         }
     }
 }
 
-/// Refuses to write `path` where anything is there already, an empty file, too, or where its folder takes no file of a log's first
+/// Refuses to write `path`, which is to be `what` ("a log"), where anything is there already, an empty file, too, or where its folder takes no file of a log's first
 /// half second.
 ///
 /// # Errors
 /// A failure that names the path.
-pub fn check_new(path: &Path) -> Result<()> {
+pub fn check_new(path: &Path, what: &str) -> Result<()> {
     if std::fs::symlink_metadata(path).is_ok() {
         return Err(refusal(
             path,
-            "it exists, and a log is never written over anything",
+            &format!("it exists, and {what} is never written over anything"),
         ));
     }
     place_of_file(path)?;
@@ -79,6 +83,8 @@ fn place_of_file(path: &Path) -> Result<()> {
 /// What the header of a checkpoint names, and that of a model.
 const CHECKPOINT: &[u8] = b"\"settings_sha256\"";
 const MODEL: &[u8] = b"\"f.w1\"";
+/// How a profile begins.
+const PROFILE: &[u8] = b"# A glove on a hand,";
 /// The headers of both are shorter.
 const HEADER: u64 = 64 << 10;
 /// The room that a model, a checkpoint or an image may need.

@@ -13,7 +13,7 @@ use bridge::protocol::message::{
     Counters, GripperStatus, Health, Hello, PerAxis, Restart, SlotContents, Slots, Status,
     WeightsKind,
 };
-use gauntlet::results::{devices, maps, named, paper, runs};
+use gauntlet::results::{devices, gloves, maps, named, paper, runs};
 use gripper::{Activation, Fault};
 use host::chip::link::Flashed;
 use host::diagnose::{Finding, Findings, Verdict};
@@ -24,6 +24,7 @@ use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::training::model::Int16;
 use host::training::quality::{Bar, Measured, Quality};
+use host::training::recorded::Seen;
 use serde::Serialize;
 use trainer::hand::Space;
 
@@ -352,6 +353,65 @@ fn results_of_bridges_keep_their_names() {
             sample("bridge select", devices::Selected { slots: &slots }),
             sample("bridge reboot", devices::Rebooted { restarting: true }),
         ],
+    );
+}
+
+#[test]
+fn results_of_gloves_keep_their_names() {
+    let scanned = || gloves::Scanned {
+        baud: 115_200,
+        scans: 350,
+        scans_per_s: 35.0,
+        interval_p50_us: Some(28_000),
+        interval_p99_us: Some(31_000),
+        interval_max_us: Some(40_000),
+        jitter_us: Some(1_100),
+        not_taken: 0,
+        unplugged: 0,
+    };
+    let sensor = gloves::Sensor {
+        segment: "hand",
+        channel: 0,
+        address: "0x28".to_owned(),
+        id: Some("00ff".to_owned()),
+        state: "good".to_owned(),
+        age_us: Some(12_000),
+        good: 349,
+        lost: 1,
+        starts: 1,
+    };
+    let error = Failure::new("the glove no longer sends frames", "its cable").into();
+    let watched = gloves::Watched {
+        place: "/dev/ttyUSB0".to_owned(),
+        took_s: 10.0,
+        calibrated: true,
+        scanned: scanned(),
+        sensors: vec![sensor],
+        found: vec!["the sensor on hand is frozen".to_owned()],
+        failure: Some(Told::of(&error)),
+    };
+    let recorded = gloves::Recorded {
+        place: "/dev/ttyUSB0".to_owned(),
+        poses: Some(runs::Poses {
+            path: path("hand.csv"),
+            rows: 2_800,
+        }),
+        covers_s: 80.0,
+        passed_over: 3,
+        scanned: scanned(),
+        movements: vec![Seen {
+            movement: "fist",
+            times: 4,
+        }],
+        good: false,
+        lacks: vec!["not seen in it: ring alone".to_owned()],
+        warnings: vec![Warning::new("a column is constant", "")],
+        next: Command::gauntlet("record").into(),
+        failure: Some(Told::of(&error)),
+    };
+    golden(
+        "gloves.json",
+        &[sample("glove watch", watched), sample("record", recorded)],
     );
 }
 

@@ -18,6 +18,7 @@ use turn::Turn;
 pub(crate) mod algebra;
 pub mod align;
 mod bends;
+mod bound;
 pub mod checks;
 mod flats;
 mod identity;
@@ -28,6 +29,7 @@ pub(crate) mod solve;
 mod turn;
 
 pub use align::{Align, Aligned};
+pub use bound::{Bound, Misfit, Unreadable};
 pub use checks::{Checks, Doubt, Verdict};
 pub use identity::Identity;
 pub use profile::{Invalid, Profile};

@@ -79,6 +79,12 @@ pub struct Headings {
     degraded: u16,
 }
 
+/// What [`Headings`] knew at one time: [`Headings::take_back`] goes back to it.
+#[derive(Debug, Clone)]
+pub struct Known {
+    joints: [Joint; SEGMENT_COUNT],
+}
+
 impl Headings {
     /// No heading known. Hinges that can be seen come by themselves in half a second; the joints on the hand are held until a
     /// flat pose ([`Headings::begin_flat`], or one that is found).
@@ -208,6 +214,25 @@ impl Headings {
         Ok(self.apply(&pose, false, at))
     }
 
+    /// No flat pose is looked at any more that was asked for.
+    pub fn cancel_flat(&mut self) {
+        self.asked = None;
+    }
+
+    /// What is known of the headings, to go back to.
+    pub fn known(&self) -> Known {
+        Known {
+            joints: self.joints.clone(),
+        }
+    }
+
+    /// Goes back to what was known. What restarted since is to be told again ([`Headings::restarted`]).
+    pub fn take_back(&mut self, known: &Known) {
+        self.joints.clone_from(&known.joints);
+        self.regain = Regain::new();
+        self.judge();
+    }
+
     /// Takes a scan.
     pub fn take(&mut self, scan: &Aligned) -> Reading {
         let (q, good) = self.by_segment(scan);
@@ -248,6 +273,7 @@ impl Headings {
             at: scan.at,
             angles: self.angles,
             held,
+            segments,
             pose,
         }
     }

@@ -9,6 +9,7 @@ use crate::timing;
 use crate::{Duration, mux};
 
 pub mod bringup;
+pub mod repair;
 
 /// Address with COM3 low, as most breakout boards have it.
 pub const ADDRESS_LOW: u8 = 0x28;

@@ -120,6 +120,8 @@ pub struct Counters {
     pub frames: u32,
     /// Good samples.
     pub good: u32,
+    /// Samples in which bit 15 of one component was flipped and put back; they count as good.
+    pub repaired: u32,
     /// Samples that did not come: no answer, or bytes lost.
     pub missed: u32,
     /// Samples refused: all zero.

@@ -73,3 +73,44 @@ pub fn since(now: Instant, then: Instant) -> gripper::Duration {
 pub fn ticks(span: Duration) -> gripper::Duration {
     gripper::Duration::from_ticks(u64::try_from(span.as_micros()).unwrap_or(u64::MAX))
 }
+
+/// A moment in UTC to the second, as RFC 3339 writes it: `2026-11-29T11:22:33Z`. Before 1970: its beginning.
+pub fn rfc3339(at: SystemTime) -> String {
+    let seconds = at
+        .duration_since(SystemTime::UNIX_EPOCH)
+        .map_or(0, |time| time.as_secs());
+    let (days, second) = (seconds / 86_400, seconds % 86_400);
+    // Years begin with March here, so that a leap day is the last of one; 400 of them are 146,097 days.
+    let from_0000 = days + 719_468;
+    let (era, day) = (from_0000 / 146_097, from_0000 % 146_097);
+    let year_of_era = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
+    let day = day - (365 * year_of_era + year_of_era / 4 - year_of_era / 100);
+    let march_month = (5 * day + 2) / 153;
+    let day = day - (153 * march_month + 2) / 5 + 1;
+    let month = (march_month + 2) % 12 + 1;
+    let year = 400 * era + year_of_era + u64::from(month <= 2);
+    let (hour, minute, second) = (second / 3_600, second / 60 % 60, second % 60);
+    format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_are_those_of_the_calendar() {
+        for (seconds, text) in [
+            (0, "1970-01-01T00:00:00Z"),
+            (951_782_399, "2000-02-28T23:59:59Z"),
+            (951_782_400, "2000-02-29T00:00:00Z"),
+            (951_868_800, "2000-03-01T00:00:00Z"),
+            (1_000_000_000, "2001-09-09T01:46:40Z"),
+            (1_709_208_000, "2024-02-29T12:00:00Z"),
+            (4_107_542_400, "2100-03-01T00:00:00Z"),
+            (1_798_761_599, "2026-12-31T23:59:59Z"),
+        ] {
+            let at = SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
+            assert_eq!(rfc3339(at), text, "{seconds}");
+        }
+    }
+}

@@ -46,6 +46,15 @@ impl Failure {
         }
     }
 
+    /// The same as a command, or a file of settings, given wrongly: exit code 2.
+    #[must_use]
+    pub fn as_usage(self) -> Self {
+        Self {
+            exit: EXIT_USAGE,
+            ..self
+        }
+    }
+
     /// Somebody asked for the end before `what` was done.
     pub fn interrupted(what: &str) -> Self {
         Self::new(

@@ -4,8 +4,10 @@
 //! |---|---|
 //! | [`lines`], [`probe`] | serial ports, Modbus TCP; does the right device answer there? |
 //! | [`session`] | a bridge that is driven and watched, in this process or on a chip |
+//! | [`scanning`] | a glove that is read by itself |
 //! | [`recording`] | the session log |
-//! | [`calibration`] | a glove calibrated from a recorded session |
+//! | [`calibration`] | a glove calibrated by a person, or from a recorded session; its profile |
+//! | [`settings`] | what a person prefers, from a file |
 //! | [`training`] | maps of hands, and of other domains, from files |
 //! | [`chip`] | the host protocol, and the emulator |
 //! | [`diagnose`] | what is wrong with a line, and what to do |
@@ -34,7 +36,10 @@ pub mod probe;
 pub mod realtime;
 pub mod recording;
 pub mod report;
+pub mod scanning;
 pub mod session;
+pub mod settings;
 pub mod stats;
+mod toml_file;
 pub mod training;
 pub mod words;

@@ -148,8 +148,8 @@ pub struct Person {
     sag: [f64; 25],
     /// By joint: its middle in free motion, degrees.
     middle: [f64; 25],
-    /// Asked to lie flat, or to move, by somebody who knows no time.
-    lie_flat: Option<bool>,
+    /// Asked for by somebody who knows no time.
+    heard: Vec<Task>,
 }
 
 impl Person {
@@ -165,7 +165,7 @@ impl Person {
             asked: Vec::new(),
             sag,
             middle,
-            lie_flat: None,
+            heard: Vec::new(),
         };
         person.ask(Task::Use(Attitude::PalmDown), f64::NEG_INFINITY);
         person
@@ -244,10 +244,8 @@ impl Person {
 
 impl PoseSource for Person {
     fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
-        match self.lie_flat.take() {
-            Some(true) => self.ask(Task::Flat, time_s),
-            Some(false) => self.ask(Task::Use(Attitude::PalmDown), time_s),
-            None => {}
+        for task in std::mem::take(&mut self.heard) {
+            Person::ask(self, task, time_s);
         }
         self.angles(time_s).map(|angle| angle as f32)
     }
@@ -257,7 +255,18 @@ impl PoseSource for Person {
     }
 
     fn lie_flat(&mut self, flat: bool) {
-        self.lie_flat = Some(flat);
+        PoseSource::ask(
+            self,
+            if flat {
+                Task::Flat
+            } else {
+                Task::Use(Attitude::PalmDown)
+            },
+        );
+    }
+
+    fn ask(&mut self, task: Task) {
+        self.heard.push(task);
     }
 }
 

@@ -2,6 +2,8 @@
 
 use thiserror::Error;
 
+use crate::person::Task;
+
 /// Gives the 25 joint angles of the virtual hand at any time.
 ///
 /// The 16 sensors sample at moments of their own, so times are asked for out of order by up to one
@@ -22,6 +24,9 @@ pub trait PoseSource: Send {
 
     /// Somebody asks the hand to lie flat until it is asked to move again, or to move.
     fn lie_flat(&mut self, _flat: bool) {}
+
+    /// Somebody asks the person whose hand it is for something, from now on; a hand that only plays its motion does not hear.
+    fn ask(&mut self, _task: Task) {}
 }
 
 /// How long [`FlatFirst`] lies flat, seconds: a calibration needs one of them.

@@ -43,6 +43,7 @@ pub fn take() -> Option<(Mps2, Devices<Mps2>)> {
         glove: Sc18im::new(Port::open(Uart::Glove)?, sc18im::Config::default()),
         gripper: Port::open(Uart::Gripper)?,
         slots: flash::slots(),
+        profile: flash::profile_slots(),
     };
     interrupts::enable();
     let board = Mps2 {

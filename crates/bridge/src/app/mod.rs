@@ -12,13 +12,14 @@
 
 mod calibrating;
 mod tick;
+mod worn;
 
 use crate::board::Board;
 use crate::clutch::{Clutch, Epoch, HeartbeatRefusal, Position};
 use crate::config::Config;
 use crate::event::{self, Event, Kind, Request};
 use crate::posture::Posture;
-use crate::store::{Expected, WeightsStore};
+use crate::store::{Expected, WeightsStore, profile::ProfileStore};
 use crate::supervisor::{Hand, State, Supervisor};
 use crate::telemetry::{Sent, Telemetry};
 use crate::{HIDDEN, Instant};
@@ -48,6 +49,7 @@ pub struct App<B: Board<X>, const X: usize> {
     scanner: BusScanner<B::Glove>,
     gripper: B::Gripper,
     store: WeightsStore<B::Flash>,
+    profiles: Option<ProfileStore<B::Flash>>,
     supervisor: Supervisor<X>,
     posture: Posture,
     hand: Option<Hand<X>>,
@@ -62,6 +64,8 @@ pub struct App<B: Board<X>, const X: usize> {
     stashed: Option<CycleEnd<B, X>>,
     gripper_error: Option<GripperError<B, X>>,
     sensors: Sensors,
+    /// How often each sensor had been started, as wired, when that was last looked at; `None` before and where the profile is new.
+    heard: Option<[u16; SEGMENT_COUNT]>,
     calibrating: Calibrating,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
@@ -87,7 +91,9 @@ struct Sensors {
     lost: u16,
     /// Told to show what no hand does.
     impossible: u16,
-    /// How often each had been started when the calibration was made; `None` without one.
+    /// Told to have lost their heading, which is looked for.
+    searching: u16,
+    /// How often each had been started, as wired, when the calibration of straight sensors was made; `None` without one.
     starts: Option<[u16; SEGMENT_COUNT]>,
 }
 
@@ -116,6 +122,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             scanner,
             gripper,
             store,
+            profiles: None,
             supervisor: Supervisor::new(config),
             posture: Posture::new(config.settings().side, None),
             hand: None,
@@ -126,6 +133,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             stashed: None,
             gripper_error: None,
             sensors: Sensors::default(),
+            heard: None,
             calibrating: Calibrating::default(),
             weights: None,
             frame_at: None,

@@ -63,11 +63,19 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             // There was none of any sensor: each has its time from now on.
             self.sensors.good = [Some(now); SEGMENT_COUNT];
         }
+        self.watch_starts(now);
+        // By where sensors sit, from here on.
+        let placed = self.posture.placed(frame);
+        let frame = placed.as_ref().unwrap_or(frame);
         self.telemetry.take_frame(frame);
         self.watch_sensors(now, frame);
         self.tell_findings(now);
-        self.try_calibration(now, frame);
+        let is_flat = self.try_calibration(now, frame);
         let reading = self.posture.read(frame);
+        if is_flat {
+            self.take_pose(now);
+        }
+        self.watch_headings(now, reading.ok().and_then(|reading| reading.pose));
         self.tell_impossible(now);
         self.telemetry.take_reading(&reading);
         let output = reading.and_then(|reading| {
@@ -117,7 +125,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
                 .is_some_and(|then| starts[segment] > then[segment]);
             if restarted
                 && self.config().settings().heading_is_relative
-                && self.posture.distrust(segment)
+                && self.posture.distrust(segment, now)
             {
                 self.tell(now, Kind::SensorRestarted { segment });
             }
@@ -128,8 +136,9 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     /// its joints are held until the next calibration.
     fn tell_findings(&mut self, now: Instant) {
         while let Some(finding) = self.scanner.next_finding() {
+            let finding = finding.placed(|sensor| self.posture.segment_of(sensor));
             if let Finding::Jumped { segment, .. } = finding {
-                self.posture.distrust(usize::from(segment));
+                self.posture.distrust(usize::from(segment), now);
             }
             self.tell(now, Kind::Sensors(finding));
         }
@@ -224,6 +233,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         self.telemetry.glove_state = self.scanner.state();
         self.telemetry.distrusted = self.posture.distrusted();
         self.telemetry.impossible = self.posture.impossible();
+        self.telemetry.profile = self.profile_state();
         let counters = &mut self.telemetry.counters;
         counters.glove = *self.scanner.counters();
         counters.gripper = self.gripper.counters();

@@ -47,7 +47,8 @@ pub enum HoldReason {
     GripperNotReady(Activation),
     /// No step for more than 100 ms, or the clock ran backwards.
     ClockGap,
-    /// The glove was not calibrated, or its calibration is worth nothing any more.
+    /// The glove was not calibrated, or its calibration is worth nothing any more:
+    /// [`Telemetry::lacks`](crate::Telemetry::lacks) says what it lacks.
     NotCalibrated,
 }
 

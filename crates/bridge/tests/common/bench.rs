@@ -4,6 +4,7 @@ use super::{FIST, Flash, hand_image};
 use bridge::app::expected;
 use bridge::event::{Event, Kind};
 use bridge::{App, Board, Config, Epoch, Instant, Platform, Settings, State, WeightsStore};
+use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
 use rig::flash::Power;
 use rig::glove::VirtualGlove;
@@ -105,13 +106,27 @@ impl Bench {
         config: rig::gripper::Config,
         driver: gripper::driver::Config,
     ) -> Self {
-        let clock = Clock::new();
-        let ahead = Arc::new(AtomicU64::new(0));
         let pose = Arc::new(Mutex::new([0.0; 25]));
         let glove = VirtualGlove::new(
             Box::new(moving(pose.clone())),
             rig::glove::Config::at_baud(115_200),
         );
+        let keeps_baud = |scanner| scanner;
+        Self::wearing(glove, keeps_baud, pose, settings, image, config, driver)
+    }
+
+    /// With this glove, and a scanner so set up; nobody moves it by `pose` who does not know it.
+    pub fn wearing(
+        glove: VirtualGlove,
+        scanner: impl FnOnce(Scanner<MemoryWire>) -> Scanner<MemoryWire>,
+        pose: Arc<Mutex<[f32; 25]>>,
+        settings: Settings<4>,
+        image: Option<Vec<u8>>,
+        config: rig::gripper::Config,
+        driver: gripper::driver::Config,
+    ) -> Self {
+        let clock = Clock::new();
+        let ahead = Arc::new(AtomicU64::new(0));
         let glove_wire = MemoryWire::new(&clock, glove.clone(), 115_200);
         let gripper = VirtualGripper::new(config);
         let gripper_wire = MemoryWire::new(&clock, gripper.clone(), 115_200);
@@ -128,7 +143,10 @@ impl Bench {
                 clock: clock.clone(),
                 ahead: Arc::clone(&ahead),
             },
-            glove::scan::Scanner::new(glove_wire.clone(), glove::scan::Config::default()),
+            scanner(Scanner::new(
+                glove_wire.clone(),
+                glove::scan::Config::default(),
+            )),
             ThreeFinger::new(gripper_wire.clone(), driver),
             store,
             Config::new(settings).expect("in range"),

@@ -4,6 +4,8 @@
 pub mod bench;
 pub mod fuzz;
 pub mod host;
+pub mod wearer;
+pub mod worn;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};

@@ -21,7 +21,7 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     if area.width < BOXES.0 || area.height < BOXES.1 {
         return small::draw(view, frame);
     }
-    let keys = key_lines(view, area.width);
+    let keys = key_lines(view.keys, area.width);
     let [head, hand, gripper, numbers, faults, foot] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(8),
@@ -31,7 +31,7 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
         Constraint::Length(keys.len().try_into().unwrap_or(1)),
     ])
     .areas(area);
-    frame.render_widget(heading(view), head);
+    frame.render_widget(heading(&view.heading()), head);
     draw_hand(view, frame, hand);
     draw_gripper(view, frame, gripper);
     frame.render_widget(
@@ -42,7 +42,7 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     frame.render_widget(Paragraph::new(keys), foot);
 }
 
-fn titled(title: &str, age: Option<f32>) -> Block<'static> {
+pub(super) fn titled(title: &str, age: Option<f32>) -> Block<'static> {
     let block = Block::bordered();
     match old(age) {
         Some(age) => block.title(Line::styled(
@@ -57,7 +57,14 @@ fn draw_hand(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let block = titled("hand: joint angles, degrees", view.hand_age);
     let inner = block.inner(area);
     frame.render_widget(block, area);
-    frame.render_widget(Paragraph::new(hand_table(view, inner.width)), inner);
+    frame.render_widget(
+        Paragraph::new(hand_table(
+            &view.fingers,
+            view.hand_age.is_none(),
+            inner.width,
+        )),
+        inner,
+    );
 }
 
 fn draw_gripper(view: &View, frame: &mut Frame<'_>, area: Rect) {
@@ -108,7 +115,7 @@ fn draw_faults(view: &View, frame: &mut Frame<'_>, area: Rect) {
     let inner = block.inner(area);
     frame.render_widget(block, area);
     frame.render_widget(
-        Paragraph::new(fault_lines(view, inner.width, inner.height.into())),
+        Paragraph::new(fault_lines(&view.faults, inner.width, inner.height.into())),
         inner,
     );
 }

@@ -1,10 +1,14 @@
-//! What a person sees while the bridge runs: a drawn view on a terminal, one plain line a second elsewhere.
+//! What a person sees while something runs, the bridge or a glove alone: a drawn view on a terminal, one plain line a second
+//! elsewhere.
 
 mod bars;
 mod draw;
+pub mod glove;
+pub mod guided;
 mod key;
 mod keys;
 mod parts;
+mod postures;
 mod raw;
 mod small;
 mod view;
@@ -14,9 +18,8 @@ use std::time::{Duration, Instant};
 
 use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
-use ratatui::{Terminal, TerminalOptions, Viewport};
+use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
 
-pub use draw::draw;
 pub use key::Key;
 pub use small::LEAST;
 pub use view::{Axis, Finger, View};
@@ -39,14 +42,41 @@ const LOOKED: Duration = Duration::from_millis(300);
 /// A space bar that comes again within this is held down: terminals wait half a second before they repeat.
 const REPEATS: Duration = Duration::from_millis(700);
 
-/// What the lines say that stand for a view.
+/// What the lines say that stand for a view of a run.
 const LEGEND: &str = "           a line a second: the state, each axis asked→at (counts, 0 open to 255 closed), rates, what is wrong";
+
+/// What is shown at one moment.
+pub trait Scene {
+    /// What the lines say that stand for the view; said once, above them.
+    const LEGEND: &'static str;
+
+    /// Drawn over the whole of `frame`.
+    fn draw(&self, frame: &mut Frame<'_>);
+
+    /// In one line, for a log file or a pipe.
+    fn line(&self) -> String;
+}
+
+impl Scene for View {
+    const LEGEND: &'static str = LEGEND;
+
+    fn draw(&self, frame: &mut Frame<'_>) {
+        draw::draw(self, frame);
+    }
+
+    fn line(&self) -> String {
+        self.line()
+    }
+}
 
 /// Where the view goes.
 #[derive(Debug)]
 enum Target {
     Drawn(Box<Drawn>),
-    Lines,
+    /// Plain ones; whether what they mean was told.
+    Lines {
+        told: bool,
+    },
     Quiet,
 }
 
@@ -70,13 +100,13 @@ impl Drawn {
         })
     }
 
-    fn show(&mut self, view: &View) -> std::io::Result<()> {
+    fn show(&mut self, scene: &impl Scene) -> std::io::Result<()> {
         let area = raw::size();
         if area != self.area {
             self.area = area;
             self.terminal.resize(area)?;
         }
-        self.terminal.draw(|frame| draw(view, frame))?;
+        self.terminal.draw(|frame| scene.draw(frame))?;
         Ok(())
     }
 }
@@ -127,8 +157,7 @@ impl Live {
         } else if std::io::stdout().is_terminal() && terminal {
             Target::Drawn(Box::new(Drawn::start()?))
         } else {
-            say!("{LEGEND}");
-            Target::Lines
+            Target::Lines { told: false }
         };
         Ok(Self {
             target,
@@ -149,14 +178,19 @@ impl Live {
         !matches!(self.target, Target::Quiet) && out::unseen() >= UNSEEN
     }
 
-    /// Shows `view` where it is time to, and where the view before was taken. Never waits.
+    /// Shows what `scene` makes where it is time to, and where the view before was taken. Never waits.
     ///
     /// # Errors
     /// The terminal's error.
-    pub fn show(&mut self, view: impl FnOnce() -> View) -> std::io::Result<()> {
-        let every = match self.target {
+    pub fn show<S: Scene>(&mut self, scene: impl FnOnce() -> S) -> std::io::Result<()> {
+        let every = match &mut self.target {
             Target::Drawn(_) => DRAW_EVERY,
-            Target::Lines => LINE_EVERY,
+            Target::Lines { told } => {
+                if !std::mem::replace(told, true) {
+                    say!("{}", S::LEGEND);
+                }
+                LINE_EVERY
+            }
             Target::Quiet => return Ok(()),
         };
         let now = Instant::now();
@@ -173,8 +207,8 @@ impl Live {
         // Kept on the beat, but never more than one beat behind.
         self.shown = Some((first + every).max(now.checked_sub(every).unwrap_or(now)));
         match &mut self.target {
-            Target::Drawn(drawn) => drawn.show(&view())?,
-            Target::Lines => say!("{}", view().line()),
+            Target::Drawn(drawn) => drawn.show(&scene())?,
+            Target::Lines { .. } => say!("{}", scene().line()),
             Target::Quiet => {}
         }
         Ok(())

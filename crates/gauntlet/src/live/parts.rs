@@ -1,51 +1,62 @@
 //! What the drawn view has on any terminal: the state, the hand's table, an axis's bar, what is wrong, the keys.
 
+use std::time::Duration;
+
 use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
 use super::bars::{Cell, axis, signed};
-use super::view::{Axis, Finger, View};
+use super::view::{Axis, Finger};
 use host::stats::seconds;
 
 pub(super) const DIM: Style = Style::new().add_modifier(Modifier::DIM);
 pub(super) const BOLD: Style = Style::new().add_modifier(Modifier::BOLD);
 const COLUMNS: [&str; 5] = ["base flex", "abduction", "twist", "mid flex", "tip flex"];
 
+/// What stands above everything.
+pub(super) struct Heading<'a> {
+    pub title: &'a str,
+    pub state: &'a str,
+    /// All is as it should be.
+    pub good: bool,
+    pub elapsed: Duration,
+    pub total: Option<Duration>,
+}
+
 /// The state first: it is what a person looks for.
-pub(super) fn heading(view: &View) -> Line<'_> {
-    let color = if view.following {
+pub(super) fn heading<'a>(shown: &Heading<'a>) -> Line<'a> {
+    let color = if shown.good {
         Color::Green
     } else {
         Color::Yellow
     };
-    let time = match view.total {
-        Some(total) => format!("{} of {}", seconds(view.elapsed), seconds(total)),
-        None => seconds(view.elapsed),
+    let time = match shown.total {
+        Some(total) => format!("{} of {}", seconds(shown.elapsed), seconds(total)),
+        None => seconds(shown.elapsed),
     };
     Line::from(vec![
         Span::styled(
-            format!(" {} ", view.state),
+            format!(" {} ", shown.state),
             Style::new().fg(Color::Black).bg(color),
         ),
         Span::raw(format!("  {time}  ")),
-        Span::styled(view.title.as_str(), BOLD),
+        Span::styled(shown.title, BOLD),
     ])
 }
 
-pub(super) fn key_lines(view: &View, width: u16) -> Vec<Line<'static>> {
-    wrapped(view.keys, width)
+pub(super) fn key_lines(keys: &str, width: u16) -> Vec<Line<'static>> {
+    wrapped(keys, width)
         .into_iter()
         .map(|line| Line::styled(line, DIM))
         .collect()
 }
 
-/// A header, and a line for each finger.
-pub(super) fn hand_table(view: &View, width: u16) -> Vec<Line<'_>> {
+/// A header, and a line for each finger; `live`: the angles are of now.
+pub(super) fn hand_table(fingers: &[Finger], live: bool, width: u16) -> Vec<Line<'_>> {
     let column = (usize::from(width).saturating_sub(8) / 5).clamp(10, 24);
     let mut lines = vec![header(column)];
-    let live = view.hand_age.is_none();
     lines.extend(
-        view.fingers
+        fingers
             .iter()
             .map(|finger| finger_line(finger, column, live)),
     );
@@ -92,16 +103,12 @@ pub(super) fn bar(shown: &Axis, width: usize, live: bool) -> impl Iterator<Item 
 }
 
 /// What is wrong, in `rows` lines at most; what does not fit is counted.
-pub(super) fn fault_lines(view: &View, width: u16, rows: usize) -> Vec<Line<'static>> {
-    if view.faults.is_empty() {
+pub(super) fn fault_lines(faults: &[String], width: u16, rows: usize) -> Vec<Line<'static>> {
+    if faults.is_empty() {
         return vec![Line::styled("all well", Style::new().fg(Color::Green))];
     }
     let red = Style::new().fg(Color::Red);
-    let faults: Vec<Vec<String>> = view
-        .faults
-        .iter()
-        .map(|fault| wrapped(fault, width))
-        .collect();
+    let faults: Vec<Vec<String>> = faults.iter().map(|fault| wrapped(fault, width)).collect();
     let total: usize = faults.iter().map(Vec::len).sum();
     let room = if total > rows {
         rows.saturating_sub(1)

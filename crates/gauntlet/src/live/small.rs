@@ -6,7 +6,7 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
 use super::parts::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines, wrapped};
-use super::view::{View, count, old};
+use super::view::{Finger, View, count, old};
 use host::stats::short_or_dash;
 
 /// The least terminal that shows state, faults and axes: columns, rows.
@@ -18,7 +18,7 @@ const TABLE: u16 = 58;
 pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
     let area = frame.area();
     let lines = if area.width < LEAST.0 || area.height < LEAST.1 {
-        too_small(view)
+        too_small(&view.state)
     } else {
         lines(view, area.width, area.height.into())
     };
@@ -26,10 +26,10 @@ pub(super) fn draw(view: &View, frame: &mut Frame<'_>) {
 }
 
 /// The state is said even here.
-fn too_small(view: &View) -> Vec<Line<'_>> {
+pub(super) fn too_small(state: &str) -> Vec<Line<'_>> {
     let (width, height) = LEAST;
     vec![
-        Line::raw(view.state.as_str()),
+        Line::raw(state),
         Line::styled(
             format!("too small: {width}×{height} at least"),
             Style::new().fg(Color::Red),
@@ -39,7 +39,7 @@ fn too_small(view: &View) -> Vec<Line<'_>> {
 
 fn lines(view: &View, width: u16, height: usize) -> Vec<Line<'_>> {
     let axes = axes(view, width);
-    let keys = key_lines(view, width);
+    let keys = key_lines(view.keys, width);
     // State, axes, and two lines for what is wrong are always there; what is left goes to the others in this order.
     let mut room = height.saturating_sub(1 + axes.len() + 2);
     let mut fit = |part: Vec<Line<'static>>| {
@@ -52,20 +52,20 @@ fn lines(view: &View, width: u16, height: usize) -> Vec<Line<'_>> {
     let keys = fit(keys);
     let rates = fit(rates(view, width));
     let hand = if width >= TABLE && room_for_table(view, room) {
-        let table = hand_table(view, width);
+        let table = hand_table(&view.fingers, view.hand_age.is_none(), width);
         room -= table.len();
         table
     } else if room > 0 {
         room -= 1;
-        vec![hand_line(view)]
+        vec![hand_line(&view.fingers, view.hand_age)]
     } else {
         Vec::new()
     };
-    let mut lines = vec![heading(view)];
+    let mut lines = vec![heading(&view.heading())];
     lines.extend(hand);
     lines.extend(axes);
     lines.extend(rates);
-    lines.extend(fault_lines(view, width, 2 + room));
+    lines.extend(fault_lines(&view.faults, width, 2 + room));
     lines.extend(keys);
     lines
 }
@@ -110,12 +110,12 @@ fn rates(view: &View, width: u16) -> Vec<Line<'static>> {
 }
 
 /// How far each finger is bent at its base, degrees.
-fn hand_line(view: &View) -> Line<'static> {
-    let mut spans = vec![match old(view.hand_age) {
+pub(super) fn hand_line(fingers: &[Finger], age: Option<f32>) -> Line<'static> {
+    let mut spans = vec![match old(age) {
         Some(age) => Span::styled(format!("{age} "), Style::new().fg(Color::Red)),
         None => Span::styled("flex ", DIM),
     }];
-    for finger in &view.fingers {
+    for finger in fingers {
         let style = if finger.good {
             Style::new()
         } else {

@@ -59,7 +59,7 @@ fn view() -> View {
 
 fn drawn(width: u16, height: u16) -> String {
     let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-    terminal.draw(|frame| draw(&view(), frame)).unwrap();
+    terminal.draw(|frame| view().draw(frame)).unwrap();
     terminal.backend().to_string()
 }
 
@@ -172,7 +172,7 @@ fn what_is_old_is_marked_in_boxes_on_small_terminals_and_in_the_line() {
     );
     for (width, height) in [(80, 24), (40, 12)] {
         let mut terminal = Terminal::new(TestBackend::new(width, height)).unwrap();
-        terminal.draw(|frame| draw(&view, frame)).unwrap();
+        terminal.draw(|frame| view.draw(frame)).unwrap();
         let text = terminal.backend().to_string();
         assert!(text.contains("3.2 s old"), "{text}");
     }
@@ -183,7 +183,7 @@ fn faults_that_do_not_fit_are_counted() {
     let mut view = view();
     view.faults = (1..=9).map(|k| format!("fault {k}")).collect();
     let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
-    terminal.draw(|frame| draw(&view, frame)).unwrap();
+    terminal.draw(|frame| view.draw(frame)).unwrap();
     let text = terminal.backend().to_string();
     assert!(
         text.contains("fault 1") && text.contains("and 8 more"),

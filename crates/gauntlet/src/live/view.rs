@@ -2,6 +2,7 @@
 
 use std::time::Duration;
 
+use super::parts::Heading;
 use host::stats::short_or_dash;
 
 /// One finger's five angles.
@@ -70,6 +71,16 @@ pub struct View {
 }
 
 impl View {
+    pub(super) fn heading(&self) -> Heading<'_> {
+        Heading {
+            title: &self.title,
+            state: &self.state,
+            good: self.following,
+            elapsed: self.elapsed,
+            total: self.total,
+        }
+    }
+
     /// The view in one line, for a log file or a pipe.
     pub fn line(&self) -> String {
         let axes: Vec<String> = self

@@ -33,7 +33,26 @@ pub fn excess(
     side: Side,
     angles: &[f32; JOINT_COUNT],
 ) -> [f32; SEGMENT_COUNT] {
+    const X: [f32; 3] = [1.0, 0.0, 0.0];
     let segments = segments(orientations, calibration);
+    excess_of(
+        &segments,
+        &Quaternion::identity(),
+        &[X; SEGMENT_COUNT],
+        side,
+        angles,
+    )
+}
+
+/// [`excess`] of segments whose thumb counts from `thumb_base` and whose hinges turn about `axes`, as in a
+/// [`Profile`](crate::calibration::Profile).
+pub fn excess_of(
+    segments: &[Quaternion; SEGMENT_COUNT],
+    thumb_base: &Quaternion,
+    axes: &[[f32; 3]; SEGMENT_COUNT],
+    side: Side,
+    angles: &[f32; JOINT_COUNT],
+) -> [f32; SEGMENT_COUNT] {
     let mut excess = [0.0; SEGMENT_COUNT];
     for finger in 0..5 {
         let (joint, first) = (first_joint(finger), first_segment(finger));
@@ -42,17 +61,24 @@ pub fn excess(
         // Turned back axis by axis it would be within: it is no farther than that.
         let base_over = over(0) + over(1) + over(2);
         if base_over > NEAR {
-            let base = segments[0].inverse() * segments[first];
+            let from = if finger == 0 {
+                segments[0] * thumb_base
+            } else {
+                segments[0]
+            };
+            let base = from.inverse() * segments[first];
             let sign = side.sign();
             let nearest = rotation::compose(within[0], sign * within[1], sign * within[2]);
             excess[first] = angle_between(&base, &nearest);
         }
         for hinge in 1..3 {
             let turned = segments[first + hinge - 1].inverse() * segments[first + hinge];
-            if turned.w * turned.w + turned.i * turned.i >= UPRIGHT && over(2 + hinge) <= REST {
+            let axis = axes[first + hinge];
+            let along = turned.i * axis[0] + turned.j * axis[1] + turned.k * axis[2];
+            if turned.w * turned.w + along * along >= UPRIGHT && over(2 + hinge) <= REST {
                 continue;
             }
-            let nearest = rotation::about_x(within[2 + hinge]);
+            let nearest = rotation::about(axis, within[2 + hinge]);
             excess[first + hinge] = angle_between(&turned, &nearest);
         }
     }

@@ -136,6 +136,8 @@ pub struct FlatHand {
     began: Option<Instant>,
     tracks: [Track; SEGMENT_COUNT],
     obstacle: Option<Refusal>,
+    /// One sensor beside the hand's may be away.
+    spares_one: bool,
 }
 
 /// One sensor in the second under way.
@@ -167,7 +169,20 @@ impl FlatHand {
             began: None,
             tracks: [track; SEGMENT_COUNT],
             obstacle: None,
+            spares_one: false,
         }
+    }
+
+    /// Does not wait for one sensor that is away, unless it is the hand's. The calibration then says nothing of its segment.
+    #[must_use]
+    pub fn sparing_one(mut self) -> Self {
+        self.spares_one = true;
+        self
+    }
+
+    /// When the second under way began; another second, another time.
+    pub fn began(&self) -> Option<Instant> {
+        self.began
     }
 
     /// Takes a frame that came at `now`.
@@ -240,7 +255,8 @@ impl FlatHand {
                 missing |= 1 << k;
             }
         }
-        if missing != 0 {
+        let spared = self.spares_one && missing.is_power_of_two() && missing & 1 == 0;
+        if missing != 0 && !spared {
             return Some(Refusal::Missing { segments: missing });
         }
         let (segment, by) = moved;
@@ -270,6 +286,9 @@ impl FlatHand {
         // From 2: the thumb's metacarpal is not judged, and the hand hangs on nothing.
         for k in 2..SEGMENT_COUNT {
             let on = parent(k).unwrap_or(0);
+            if self.tracks[k].first.is_none() || self.tracks[on].first.is_none() {
+                continue;
+            }
             // The thumb's base lies otherwise than the hand.
             let against_hand = if k < 4 { 0.0 } else { angle(&up[0], &up[k]) };
             let by = angle(&up[on], &up[k]).max(against_hand);

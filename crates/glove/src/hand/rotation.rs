@@ -9,6 +9,13 @@ pub(super) fn about_x(angle: f32) -> Quaternion {
     Quaternion::new_unchecked(Raw::new(cos, sin, 0.0, 0.0))
 }
 
+/// The rotation by `angle` radians about the unit vector `axis`.
+pub(super) fn about(axis: [f32; 3], angle: f32) -> Quaternion {
+    let (sin, cos) = libm::sincosf(0.5 * angle);
+    let [x, y, z] = axis.map(|c| sin * c);
+    Quaternion::new_unchecked(Raw::new(cos, x, y, z))
+}
+
 /// `R_x(flexion) R_y(abduction) R_z(twist)`, radians.
 pub(super) fn compose(flexion: f32, abduction: f32, twist: f32) -> Quaternion {
     let (sy, cy) = libm::sincosf(0.5 * abduction);

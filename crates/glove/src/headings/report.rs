@@ -1,7 +1,7 @@
 //! What the headings tell.
 
 use crate::Instant;
-use crate::hand::{self, JOINT_COUNT, SEGMENT_COUNT};
+use crate::hand::{self, JOINT_COUNT, Quaternion, SEGMENT_COUNT};
 
 /// What a scan says about the hand.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,6 +12,8 @@ pub struct Reading {
     pub angles: [f32; JOINT_COUNT],
     /// Joints that are held (bit j): a sensor beside them is missing or has no heading, or the heading is not sure.
     pub held: u32,
+    /// The segments in the hand's world, headings taken out. Those beside a held joint mean nothing.
+    pub segments: [Quaternion; SEGMENT_COUNT],
     /// A flat pose was taken in this scan.
     pub pose: Option<PoseReport>,
 }

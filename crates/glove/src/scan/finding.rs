@@ -59,6 +59,51 @@ pub enum Finding {
     },
 }
 
+impl Finding {
+    /// The same by where sensors sit: `place` gives the segment of the sensor that is wired as the one it is asked for.
+    #[must_use]
+    pub fn placed(self, place: impl Fn(u8) -> u8) -> Self {
+        let places = |sensors: u16| {
+            (0..SEGMENT_NAMES.len() as u8)
+                .filter(|k| sensors >> k & 1 == 1)
+                .fold(0, |mask, k| {
+                    mask | 1u16.checked_shl(u32::from(place(k))).unwrap_or(0)
+                })
+        };
+        match self {
+            Finding::Frozen { segment } => Finding::Frozen {
+                segment: place(segment),
+            },
+            Finding::Jumped { segment, by } => Finding::Jumped {
+                segment: place(segment),
+                by,
+            },
+            Finding::Returned { segments, by } => Finding::Returned {
+                segments: places(segments),
+                by,
+            },
+            Finding::AfterGap { segments, by, gap } => Finding::AfterGap {
+                segments: places(segments),
+                by,
+                gap,
+            },
+            Finding::Impossible { segment } => Finding::Impossible {
+                segment: place(segment),
+            },
+            Finding::WrongSensor { segment, error } => Finding::WrongSensor {
+                segment: place(segment),
+                error: match error {
+                    imu::Error::SameSensor { segment } => imu::Error::SameSensor {
+                        segment: place(segment),
+                    },
+                    other => other,
+                },
+            },
+            Finding::AllFrozen | Finding::Twins { .. } => self,
+        }
+    }
+}
+
 impl core::fmt::Display for Finding {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let name = |segment: u8| SEGMENT_NAMES.get(usize::from(segment)).unwrap_or(&"?");

@@ -152,6 +152,8 @@ impl Sensor {
 
     /// Eight bytes arrived that were asked for at `stamp`.
     pub fn take(&mut self, raw: [u8; imu::SAMPLE_BYTES], stamp: Instant, counters: &mut Counters) {
+        let (raw, mended) = imu::repair::repaired(raw);
+        counters.repaired = counters.repaired.wrapping_add(u32::from(mended));
         self.raw = Some(raw);
         self.pointer_set = true;
         match self.judge(&raw, stamp) {
@@ -359,8 +361,15 @@ impl Sensor {
         self.raw = None;
     }
 
-    /// A step of its bring-up ended well; true when the sensor is up after a real start.
-    pub fn step_done(&mut self, step: Step, outcome: Outcome, now: Instant) -> bool {
+    /// A step of its bring-up ended well; true when the sensor is up after a real start. `relative`: its heading is another then, so
+    /// that where it was says nothing of where it is.
+    pub fn step_done(
+        &mut self,
+        step: Step,
+        outcome: Outcome,
+        relative: bool,
+        now: Instant,
+    ) -> bool {
         self.tries = 0;
         self.forget();
         self.due = after(now, outcome.pause);
@@ -378,6 +387,9 @@ impl Sensor {
             return false;
         }
         (self.fresh, self.suspect) = (false, None);
+        if relative {
+            self.good = None;
+        }
         self.up_since = now;
         self.health = Health::Starting;
         true

@@ -26,6 +26,11 @@ impl Ids {
 }
 
 impl<B> BusScanner<B> {
+    /// The unique id of each sensor as it is wired, where one was read and is in no doubt.
+    pub fn ids(&self) -> [Option<UniqueId>; SEGMENT_COUNT] {
+        self.ids.known
+    }
+
     /// Whether the sensor that answers as `k` may be it. One that is taken for two puts both in doubt.
     ///
     /// # Errors
@@ -35,7 +40,12 @@ impl<B> BusScanner<B> {
         let known = self.ids.known.get(k).copied().flatten();
         self.ids.useless |= holder.is_some_and(|holder| holder == k ^ 1);
         let error = match (holder, known) {
-            _ if self.ids.useless => return Ok(()),
+            _ if self.ids.useless => {
+                if let Some(known) = self.ids.known.get_mut(k) {
+                    *known = Some(id);
+                }
+                return Ok(());
+            }
             (Some(holder), _) if holder != k => {
                 if let (Some(other), Some(known)) =
                     (self.sensors.get_mut(holder), self.ids.known.get_mut(holder))

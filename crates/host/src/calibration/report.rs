@@ -224,7 +224,7 @@ fn flat_pose((at, report): &(glove::Instant, glove::headings::PoseReport)) -> Fl
     }
 }
 
-fn word(verdict: Verdict) -> &'static str {
+pub(super) fn word(verdict: Verdict) -> &'static str {
     match verdict {
         Verdict::Good => "good",
         Verdict::Doubtful => "doubtful",

@@ -3,6 +3,7 @@
 mod bridge_chip;
 mod bridge_line;
 mod i2c;
+mod own;
 mod sensors;
 
 use std::path::Path;

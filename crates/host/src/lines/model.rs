@@ -33,7 +33,7 @@ impl Model {
     }
 
     /// What the command line calls it.
-    pub fn option(self) -> &'static str {
+    pub const fn option(self) -> &'static str {
         match self {
             Self::ThreeFinger => "3f",
             Self::TwoFinger85 => "2f85",

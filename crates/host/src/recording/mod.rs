@@ -6,9 +6,12 @@
 //! is counted and said. Every half second a chunk is closed: whatever ends the program, the file can be read from its
 //! start until then. A disk that takes no more ends the log and nothing else; [`SessionLog::fault`] says so at once, and
 //! the file ends after the last whole chunk.
+//!
+//! [`poses`] writes what a training reads: a hand's joint angles as CSV.
 
 mod channels;
 mod file;
+pub mod poses;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};

@@ -13,7 +13,7 @@ use super::told::Told;
 use crate::failure::{Failure, told};
 use crate::interrupt::Interrupt;
 use crate::next::{Command, NextStep, Warning};
-use crate::report::Reporter;
+use crate::report::{Nobody, Reporter};
 
 /// A state is kept so often.
 const KEEP_EVERY: Duration = Duration::from_secs(60);
@@ -30,12 +30,7 @@ pub fn learn(
     reporter: &dyn Reporter,
     interrupt: &Interrupt,
 ) -> Result<Ended> {
-    let settings = course.settings(task);
-    let (q, x) = (
-        task.units.q.apply_all(&task.training),
-        task.units.x.apply_all(&task.targets),
-    );
-    let mut trainer = Trainer::new(&q, &x, &settings).map_err(told)?;
+    let mut trainer = trainer(task, course)?;
     if let Some(path) = &course.resume {
         trainer
             .load_checkpoint(path)
@@ -101,6 +96,31 @@ pub fn learn(
         Pause::StopAt => Ok(Ended::StoppedAt(trainer.epoch())),
         Pause::Interrupt => Err(broken_off(course, trainer.epoch())),
     }
+}
+
+/// What a training of `task` would say of its data, without training.
+///
+/// # Errors
+/// A failure that says what is wrong with the data.
+pub(super) fn warnings(task: &Task, course: &Course) -> Result<Vec<Warning>> {
+    let mut trainer = trainer(task, course)?;
+    let mut said = Told {
+        progress: Nobody.begin("looking at the data", 0),
+        warnings: Vec::new(),
+        names: task.names,
+    };
+    for warning in trainer.take_warnings() {
+        said.tell(&warning, &trainer.progress());
+    }
+    Ok(said.warnings)
+}
+
+fn trainer(task: &Task, course: &Course) -> Result<Trainer> {
+    let (q, x) = (
+        task.units.q.apply_all(&task.training),
+        task.units.x.apply_all(&task.targets),
+    );
+    Trainer::new(&q, &x, &course.settings(task)).map_err(told)
 }
 
 /// Why a training ends before its end.

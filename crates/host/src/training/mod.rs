@@ -5,8 +5,10 @@ pub mod hand;
 mod learn;
 pub mod model;
 pub mod motion;
+pub mod movements;
 mod pairs;
 pub mod quality;
+pub mod recorded;
 mod task;
 mod told;
 

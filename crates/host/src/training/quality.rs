@@ -45,7 +45,7 @@ impl Bar {
 /// occupancy falls with their number, and neighbours in time stand for nothing new.
 pub const MEASURED: usize = 254;
 /// Fewest of them that the volume occupancy is taken to be of: a handful of poses with balls of their own would cover the gripper.
-const LEAST_MEASURED: usize = 200;
+pub(super) const LEAST_MEASURED: usize = 200;
 /// Gripper poses that stand for the whole configuration space.
 pub const TARGETS: usize = 8000;
 

@@ -30,6 +30,11 @@ impl VirtualGlove {
         lock(&self.state).hand.pose.lie_flat(flat);
     }
 
+    /// Asks the person whose hand it is for something, from now on; a hand that only plays its motion does not hear.
+    pub fn ask(&self, task: crate::person::Task) {
+        lock(&self.state).hand.pose.ask(task);
+    }
+
     /// Takes sensor `index` off the bus (every access is a NACK), or puts it back as it was.
     pub fn unplug(&self, index: usize, unplugged: bool) {
         self.sensor(index, |chip| chip.faults.unplugged = unplugged);

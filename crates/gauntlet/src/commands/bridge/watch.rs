@@ -7,12 +7,13 @@ use anyhow::Result;
 
 use super::args::BridgeAt;
 use super::drive::{drive, finish, start};
-use super::poses::Poses;
+use super::poses;
 use crate::outputs;
 use crate::results::runs;
 use crate::tell::Tell;
 use host::failure::with_others;
 use host::interrupt::Interrupt;
+use host::recording::poses::PosesFile;
 
 pub(super) fn monitor(
     at: &BridgeAt,
@@ -31,14 +32,14 @@ pub(super) fn log(
     interrupt: &Interrupt,
 ) -> Result<()> {
     let tell = Tell::new(at.json);
-    outputs::check_new(path)?;
+    outputs::check_new(path, "a log")?;
     let link = at.connect()?;
-    let (poses, samples) = Poses::create(path, interrupt)?;
+    let (file, samples) = PosesFile::create(path, interrupt, poses::rows())?;
     let driven = start(link, Some(samples), at.devices(), interrupt).map(|mut run| {
         let driven = drive(&mut run, "gauntlet bridge log", seconds, false, at.json);
         (run.finish(), driven)
     });
-    let (rows, written) = poses.finish();
+    let (rows, written) = file.finish();
     let (finished, driven) = match (driven, &written) {
         (Ok(done), _) => done,
         (Err(first), Err(other)) => return Err(with_others(first, vec![format!("{other:#}")])),

@@ -33,7 +33,7 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         Motion::open_for_training(options.poses.as_deref(), options.seed, &Person)
     })?;
     if let Some(path) = &options.log {
-        outputs::check_new(path)?;
+        outputs::check_new(path, "a log")?;
     }
     let start = match options.on_chip {
         true => on_chip::start,

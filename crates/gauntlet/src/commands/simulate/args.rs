@@ -21,6 +21,8 @@ Examples:
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
+  gauntlet simulate --honest 7                                       sensors as they really are; in another terminal:
+  gauntlet calibrate --glove /tmp/glove
   gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
@@ -28,6 +30,8 @@ ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT li
 takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
 The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
 Enter lays it flat at any time, and Enter again lets it move. \
+With --honest its sensors are as real ones: sewn on any way, each with a heading of its own that drifts, noise, flipped bits. \
+Its person does by itself what `gauntlet calibrate --glove PATH` asks for. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -45,6 +49,24 @@ pub struct Simulate {
     /// Seed of the generated motion.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// A virtual person with sensors as they really are, from this seed, instead of a hand whose sensors sit straight.
+    #[arg(long, value_name = "SEED", conflicts_with = "poses")]
+    pub honest: Option<u64>,
+    /// The virtual person's glove is a left one.
+    #[arg(long, requires = "honest")]
+    pub left: bool,
+    /// Two sensors of it, as they are wired, are swapped: 8,11.
+    #[arg(long, value_name = "A,B", requires = "honest", value_parser = swapped)]
+    pub swap: Option<(usize, usize)>,
+}
+
+/// Two different sensors.
+fn swapped(text: &str) -> Result<(usize, usize), String> {
+    let pair = text
+        .split_once(',')
+        .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    pair.filter(|(a, b): &(usize, usize)| a != b && *a < 16 && *b < 16)
+        .ok_or_else(|| format!("{text} is not two sensors from 0 to 15, like 8,11"))
 }
 
 impl Simulate {
@@ -75,6 +97,9 @@ mod tests {
             gripper_model: None,
             poses: None,
             seed: 1,
+            honest: None,
+            left: false,
+            swap: None,
         }
     }
 

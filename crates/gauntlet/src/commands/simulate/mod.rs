@@ -21,8 +21,8 @@ use host::lines::Model;
 use host::probe;
 use host::training::motion::Motion;
 
-/// How often the wait for Ctrl-C looks for a line on standard input.
-const WATCH: Duration = Duration::from_millis(100);
+/// How often the wait for Ctrl-C looks for a line on standard input, and for what the virtual person is asked.
+const WATCH: Duration = Duration::from_millis(50);
 
 /// Runs until interrupted.
 ///
@@ -33,10 +33,10 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
     let motion = Motion::open(options.poses.as_deref(), options.seed, &Person)?;
     let glove = glove_place
-        .map(|path| Glove::start(&motion, path))
+        .map(|path| Glove::start(&motion, options, path))
         .transpose()?;
     if let Some(glove) = &glove {
-        say!("glove    {}", glove.describe(&motion));
+        say!("glove    {}", glove.describe(&motion, options.honest));
     }
     let gripper = gripper_place
         .map(|place| Gripper::start(place, model))
@@ -60,6 +60,9 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     while !interrupt.sleep(WATCH) {
         if let Some(hand) = &mut hand {
             hand.listen();
+        }
+        if let Some(ear) = glove.as_ref().and_then(|glove| glove.ear.as_ref()) {
+            ear.listen();
         }
     }
     // Taking the handles down removes the links.

@@ -46,7 +46,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     let model = options.gripper_model;
     let line = options.line.settings(&options.gripper)?;
     if let Some(path) = &options.log {
-        outputs::check_new(path)?;
+        outputs::check_new(path, "a log")?;
     }
     let image = model::weights(&options.model, None, &Person)?.image;
     check_image(&image, model)?;
@@ -83,6 +83,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         line,
         image,
         side: side(options.hand),
+        profile: None,
         feed,
     };
     let session = InProcess::start(parts, clock, interrupt)?;

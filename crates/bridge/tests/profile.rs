@@ -1,0 +1,332 @@
+//! The bridge with an honest glove and its profile: flat poses, restarts, power cuts, another's profile.
+
+mod common;
+
+use bridge::calibration::{Lack, Refusal, Try};
+use bridge::event::Kind;
+use bridge::{HoldReason, State};
+use common::bench::{Bench, MS, S};
+use common::wearer::Wearer;
+use glove::calibration::Misfit;
+use glove::hand::SEGMENT_COUNT;
+use rig::person::{Attitude, Person, Task};
+
+/// The angles of the little finger's base and of the hinge after it.
+const BESIDE_13: u32 = 0b1111 << 20;
+
+/// A person whose hand lies flat, works from 12 s on, and lies flat again from 30 s on.
+fn wearing(wearer: &Wearer) -> (Bench, Person) {
+    wearer.bench(&[
+        (Task::Flat, 0.0),
+        (Task::Use(Attitude::PalmDown), 12.0),
+        (Task::Flat, FLAT_AGAIN as f64 * 1e-6),
+    ])
+}
+
+const FLAT_AGAIN: u64 = 30 * S;
+
+/// Calibrated by the profile and a flat pose, activated, following the hand.
+fn following(wearer: &Wearer) -> (Bench, Person) {
+    let (mut bench, person) = wearing(wearer);
+    bench
+        .app
+        .set_profile(Some(&wearer.profile()))
+        .expect("open");
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    bench.app.activate();
+    pose(&mut bench).expect("flat");
+    bench.until("activated", |b| {
+        let status = b.app.telemetry().status;
+        status.is_some_and(|status| status.activation == gripper::Activation::Ready)
+    });
+    bench.follow();
+    (bench, person)
+}
+
+fn is_not_calibrated(state: State) -> bool {
+    matches!(
+        state,
+        State::Holding(HoldReason::NotCalibrated) | State::SafeAction(HoldReason::NotCalibrated)
+    )
+}
+
+/// A flat pose, and how it ended.
+fn pose(bench: &mut Bench) -> Result<(), Refusal> {
+    let before = bench.app.telemetry().calibration.ended;
+    bench.app.calibrate_flat_hand();
+    bench.until("an end", |b| b.app.telemetry().calibration.ended != before);
+    match bench.app.telemetry().calibration.newest {
+        Try::Taken => Ok(()),
+        Try::Refused(why) => Err(why),
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Root mean square of how far the joints of `mask` are off, degrees, over a time.
+fn off(bench: &mut Bench, person: &Person, mask: u32, us: u64) -> f32 {
+    let (mut sum, mut n, end) = (0.0, 0.0, bench.now() + us);
+    let mut seen = bench.app.telemetry().frame_sequence;
+    while bench.now() < end {
+        bench.step();
+        let telemetry = bench.app.telemetry();
+        if core::mem::replace(&mut seen, telemetry.frame_sequence) == telemetry.frame_sequence {
+            continue;
+        }
+        // The scan began 30 ms ago and the chips are some 5 ms behind.
+        let truth = person.angles(bench.now() as f64 * 1e-6 - 0.035);
+        for (j, (measured, truth)) in telemetry.angles.iter().zip(truth).enumerate() {
+            if mask >> j & 1 == 1 {
+                sum += (measured - truth as f32).to_degrees().powi(2);
+                n += 1.0;
+            }
+        }
+    }
+    (sum / n).sqrt()
+}
+
+#[test]
+fn with_its_profile_one_flat_pose_is_enough_to_follow_an_honest_glove() {
+    let (mut bench, person) = following(&Wearer::new(1));
+    assert!(bench.told(Kind::ProfileFits));
+    assert_eq!(bench.app.telemetry().lacks(), None);
+    bench.run(4 * S);
+    let all = off(&mut bench, &person, (1 << 25) - 1, 10 * S);
+    assert!(all < 4.0, "{all}°");
+    assert_eq!(bench.state(), State::Following);
+    let telemetry = bench.app.telemetry();
+    assert_eq!((telemetry.unknown, telemetry.held_joints), (0, 0));
+    assert!(telemetry.counters.glove.repaired > 20);
+    assert!(telemetry.sigma.iter().all(|sigma| sigma.to_degrees() < 4.1));
+}
+
+#[test]
+fn without_a_profile_a_flat_pose_is_refused_and_nothing_moves() {
+    let (mut bench, _) = wearing(&Wearer::new(1));
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    assert_eq!(pose(&mut bench), Err(Refusal::NoProfile));
+    assert_eq!(bench.app.telemetry().lacks(), Some(Lack::Profile));
+    bench.app.activate();
+    bench.clutch = true;
+    bench.run(12 * S);
+    assert_eq!(bench.state(), State::Holding(HoldReason::NotCalibrated));
+}
+
+#[test]
+fn a_profile_of_another_glove_is_refused_and_its_sensors_are_named() {
+    let wearer = Wearer::new(1);
+    let (mut bench, _) = wearing(&wearer);
+    let mut other = wearer.profile();
+    other.ids.swap(8, 11);
+    bench.app.set_profile(Some(&other)).expect("open");
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    assert!(bench.told(Kind::ProfileMisfit(Misfit::Differ(1 << 8 | 1 << 11))));
+    let telemetry = bench.app.telemetry();
+    assert!(telemetry.profile.is_there && !telemetry.profile.fits);
+    assert_eq!(telemetry.lacks(), Some(Lack::OwnProfile));
+    assert_eq!(pose(&mut bench), Err(Refusal::OtherGlove));
+    assert!(!bench.app.telemetry().calibration.is_calibrated);
+}
+
+#[test]
+fn a_sensor_that_restarts_costs_the_joints_beside_it_until_its_heading_is_found() {
+    let wearer = Wearer::new(1);
+    let (mut bench, person) = following(&wearer);
+    bench.run(15 * S);
+    let others = (1 << 25) - 1 & !BESIDE_13;
+    bench.glove.reset_sensor(13, bench.clock.now());
+    let (mut held, mut frames, mut since) = (0, 0, None);
+    let (begun, mut seen) = (bench.now(), bench.app.telemetry().frame_sequence);
+    while bench.now() < begun + 3 * S {
+        bench.step();
+        let telemetry = bench.app.telemetry();
+        if core::mem::replace(&mut seen, telemetry.frame_sequence) == telemetry.frame_sequence {
+            continue;
+        }
+        assert_eq!(telemetry.held_joints & others, 0, "others are not held");
+        frames += 1;
+        if telemetry.held_joints & BESIDE_13 != 0 {
+            held += 1;
+            since = Some(bench.now() - begun);
+        }
+    }
+    println!("held in {held} of {frames} frames, until {since:?} µs");
+    assert!(since.is_some_and(|since| (1_000 * MS..1_800 * MS).contains(&since)));
+    assert!(bench.told(Kind::HeadingLost { segment: 13 }));
+    assert!(bench.told(Kind::HeadingFound { segment: 13 }));
+    assert_eq!(bench.state(), State::Following);
+    let beside = off(&mut bench, &person, BESIDE_13, 5 * S);
+    assert!(beside < 6.0, "{beside}°");
+}
+
+#[test]
+fn when_the_hands_sensor_restarts_everything_waits_for_a_flat_pose() {
+    let wearer = Wearer::new(1);
+    let (mut bench, _) = following(&wearer);
+    bench.run(10 * S);
+    bench.glove.reset_sensor(0, bench.clock.now());
+    bench.run(3 * S);
+    let held = |state| {
+        matches!(
+            state,
+            State::Holding(HoldReason::NotCalibrated)
+                | State::SafeAction(HoldReason::NotCalibrated)
+        )
+    };
+    assert!(held(bench.state()), "{:?}", bench.state());
+    assert_eq!(bench.app.telemetry().lacks(), Some(Lack::FlatPose));
+    assert!(bench.told(Kind::HeadingLost { segment: 0 }));
+    bench.release();
+    lie_flat(&mut bench);
+    pose(&mut bench).expect("flat");
+    bench.follow();
+}
+
+/// The hand lies flat again, for some seconds already.
+fn lie_flat(bench: &mut Bench) {
+    assert!(bench.now() < FLAT_AGAIN);
+    bench.run(FLAT_AGAIN + 4 * S - bench.now());
+}
+
+#[test]
+fn after_a_power_cut_of_the_glove_one_flat_pose_goes_on() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(5 * S);
+    bench.glove.power(false, bench.clock.now());
+    bench.run(S);
+    bench.glove.power(true, bench.clock.now());
+    bench.run(8 * S);
+    assert!(is_not_calibrated(bench.state()), "{:?}", bench.state());
+    assert_eq!(bench.app.telemetry().lacks(), Some(Lack::FlatPose));
+    bench.release();
+    lie_flat(&mut bench);
+    assert!(
+        !bench.app.telemetry().calibration.is_calibrated,
+        "not by itself"
+    );
+    pose(&mut bench).expect("flat");
+    bench.follow();
+}
+
+#[test]
+fn a_flat_pose_can_be_taken_back_and_what_restarted_since_stays_lost() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.app.set_finds_flat(false);
+    bench.release();
+    lie_flat(&mut bench);
+    let before = bench.app.telemetry().sigma;
+    pose(&mut bench).expect("flat");
+    let posed = bench.app.telemetry().sigma;
+    assert!(posed[13] < 0.9 * before[13], "the pose made it surer");
+    bench.app.undo_calibration();
+    assert_eq!(bench.app.telemetry().calibration.newest, Try::Undone);
+    bench.run(100 * MS);
+    assert!(bench.app.telemetry().calibration.is_calibrated);
+    let after = bench.app.telemetry().sigma;
+    for k in 0..SEGMENT_COUNT {
+        assert!((before[k] - after[k]).abs() < 0.002, "{k}");
+    }
+    pose(&mut bench).expect("flat");
+    bench.glove.reset_sensor(0, bench.clock.now());
+    bench.run(2 * S);
+    bench.app.undo_calibration();
+    bench.run(500 * MS);
+    assert!(!bench.app.telemetry().calibration.is_calibrated);
+}
+
+#[test]
+fn a_flat_pose_is_found_while_the_gripper_follows_and_enters_over_a_second() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    let mut last = bench.app.telemetry().angles;
+    let (mut poses, mut fastest) = (bench.app.telemetry().poses, 0.0_f32);
+    let (mut entered, mut seen) = (None, 0);
+    while bench.now() < FLAT_AGAIN + 8 * S {
+        bench.step();
+        let telemetry = bench.app.telemetry();
+        if core::mem::replace(&mut seen, telemetry.frame_sequence) == telemetry.frame_sequence {
+            continue;
+        }
+        if core::mem::replace(&mut poses, telemetry.poses) != telemetry.poses {
+            entered = Some(bench.now());
+        }
+        if entered.is_some_and(|at| bench.now() < at + S) {
+            for (angle, last) in telemetry.angles.iter().zip(last) {
+                fastest = fastest.max((angle - last).abs().to_degrees());
+            }
+        }
+        last = telemetry.angles;
+    }
+    assert!(entered.is_some_and(|at| at > FLAT_AGAIN), "{entered:?}");
+    // Noise and tremor alone make 1.2°.
+    assert!(fastest < 2.0, "{fastest}° from one frame to the next");
+    let found = |event: &bridge::Event| matches!(event.kind, Kind::FlatPoseFound { .. });
+    assert!(bench.events.iter().any(found));
+    assert_eq!(bench.state(), State::Following);
+}
+
+#[test]
+fn a_sensor_that_jumped_is_held_until_a_flat_pose() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(2 * S);
+    bench.glove.slip(14, [0.0, 0.0, 1.0], 120.0);
+    bench.run(5 * S);
+    assert_eq!(bench.app.telemetry().distrusted, 1 << 14);
+    assert_eq!(bench.app.telemetry().held_joints, 0b11 << 23);
+    assert_eq!(bench.state(), State::Following);
+    bench.release();
+    bench.glove.slip(14, [0.0, 0.0, 1.0], -120.0);
+    lie_flat(&mut bench);
+    pose(&mut bench).expect("flat");
+    bench.run(S);
+    assert_eq!(bench.app.telemetry().distrusted, 0);
+    assert_eq!(bench.app.telemetry().held_joints, 0);
+}
+
+#[test]
+fn one_sensor_that_is_away_costs_its_joints_and_not_the_flat_pose() {
+    let wearer = Wearer::new(1);
+    let (mut bench, _) = wearing(&wearer);
+    bench
+        .app
+        .set_profile(Some(&wearer.profile()))
+        .expect("open");
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    pose(&mut bench).expect("flat");
+    bench.glove.unplug(6, true);
+    bench.run(S);
+    pose(&mut bench).expect("flat, as far as can be seen");
+    bench.glove.unplug(0, true);
+    bench.run(S);
+    assert_eq!(pose(&mut bench), Err(Refusal::Missing(1 << 6 | 1)));
+}
+
+#[test]
+fn sensors_that_sit_elsewhere_are_told_by_where_they_sit() {
+    let mut wearer = Wearer::new(1);
+    wearer.honest.seats.swap(8, 11);
+    let profile = wearer.profile();
+    assert_eq!(profile.profile.sensors[8], 11);
+    let (mut bench, person) = following(&wearer);
+    bench.run(4 * S);
+    let all = off(&mut bench, &person, (1 << 25) - 1, 5 * S);
+    assert!(all < 4.0, "{all}°");
+    // What is wired as 8 sits on 11, the middle of the ring finger.
+    bench.glove.unplug(8, true);
+    bench.run(S);
+    assert!(bench.told(Kind::SensorLost { segment: 11 }));
+    assert_eq!(bench.app.telemetry().held_joints, 0b11 << 18);
+    assert_eq!(bench.app.telemetry().missing, 1 << 11);
+}
+
+#[test]
+fn a_bent_or_moving_hand_is_no_flat_pose() {
+    let wearer = Wearer::new(1);
+    let (mut bench, _) = wearer.bench(&[(Task::Use(Attitude::PalmDown), 0.0)]);
+    bench
+        .app
+        .set_profile(Some(&wearer.profile()))
+        .expect("open");
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    let refused = pose(&mut bench).expect_err("it moves");
+    assert!(matches!(refused, Refusal::Moving { .. }), "{refused:?}");
+    assert!(!bench.app.telemetry().calibration.is_calibrated);
+}

@@ -1,0 +1,69 @@
+//! `gauntlet glove`: a glove by itself, with no gripper and no map.
+
+mod at;
+mod flat;
+mod watch;
+
+use std::time::Duration;
+
+use anyhow::Result;
+use clap::{Args, Subcommand};
+
+use crate::options::run_time;
+use host::interrupt::Interrupt;
+
+pub use at::GloveAt;
+pub(in crate::commands) use at::Opened;
+pub(in crate::commands) use flat::take_flat;
+
+/// Options of `glove`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet glove watch --glove /dev/ttyUSB0                      the sensors, the rates
+  gauntlet glove watch --glove /tmp/glove --ideal --seconds 10   a virtual glove's hand, too
+
+watch only reads. Without a calibration the angles are those of sensors that would sit straight, and that is said. \
+q or Ctrl-C ends it and prints how every sensor did. Exit code 1 where the glove gave nothing at the end.")]
+pub struct Glove {
+    /// What to do.
+    #[command(subcommand)]
+    pub verb: Verb,
+}
+
+/// What can be done with a glove by itself.
+#[derive(Debug, Subcommand)]
+pub enum Verb {
+    /// Show the hand, the rates and each sensor until the time is over or Ctrl-C.
+    Watch(Watch),
+}
+
+/// Options of `glove watch`.
+#[derive(Debug, Args)]
+pub struct Watch {
+    /// The glove.
+    #[command(flatten)]
+    pub at: GloveAt,
+    /// End by itself after this many seconds (1 to 86400).
+    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
+    pub seconds: Option<Duration>,
+}
+
+impl Glove {
+    /// Whether a program reads the result.
+    pub fn json(&self) -> bool {
+        match &self.verb {
+            Verb::Watch(options) => options.at.json,
+        }
+    }
+}
+
+/// Does it.
+///
+/// # Errors
+/// A failure that names the port or the sensor.
+pub(crate) fn run(options: &Glove, interrupt: &Interrupt) -> Result<()> {
+    match &options.verb {
+        Verb::Watch(options) => watch::run(options, interrupt),
+    }
+}

@@ -1,0 +1,236 @@
+//! `gauntlet record`: what `train` needs, from a glove on a port: a person's hand as a poses file.
+
+mod prompts;
+mod session;
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use anyhow::Result;
+use clap::Args;
+
+use super::glove::{GloveAt, Opened, take_flat};
+use crate::options::run_time;
+use crate::outputs;
+use crate::results::{self, gloves, runs};
+use crate::tell::Tell;
+use host::clock::Clock;
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::next::{Command, NextStep};
+use host::recording::poses::PosesFile;
+use host::training::recorded::{self, Verdict};
+use session::Session;
+
+/// Options of `record`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet record --glove /dev/ttyUSB0 --out my_hand.csv
+  gauntlet record --glove /tmp/glove --ideal --out my_hand.csv --seconds 70
+  gauntlet train --poses my_hand.csv --out model.safetensors   (then)
+
+No gripper and no model is needed. The hand lies flat first, then each movement is asked for in words: 80 seconds. \
+What was not seen is asked once more. Ctrl-C ends it, and what was recorded until then is kept. \
+A pose of which a joint was not measured is no row. A file that exists is never written over. \
+Exit code 1 where the recording is not good enough to train on; the file is there all the same.")]
+pub struct Record {
+    /// The glove.
+    #[command(flatten)]
+    pub at: GloveAt,
+    /// Write the poses into this new file.
+    #[arg(long, value_name = "POSES.csv")]
+    pub out: PathBuf,
+    /// Record for so many seconds without prompts (1 to 86400).
+    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
+    pub seconds: Option<Duration>,
+}
+
+/// Records until everything was shown, the time is over or somebody ends it.
+///
+/// # Errors
+/// A failure that names the port, the sensor or the file; that the recording is not good enough to train on.
+pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(options.at.json);
+    outputs::check_new(&options.out, "a recording")?;
+    let clock = Clock::start();
+    let Opened {
+        mut scanning,
+        hand,
+        missing,
+    } = options.at.open(&tell, clock, interrupt)?;
+    complete(options, missing)?;
+    let mut hand = hand.map_err(|why| not_calibrated(options, &why))?;
+    if !take_flat(&mut hand, &mut scanning, clock, &tell, interrupt)? {
+        return Err(Failure::interrupted("before anything was recorded").into());
+    }
+    // A full disk is the writer's to tell.
+    interrupt.look_after_file_limit();
+    let (file, rows) = PosesFile::create(&options.out, interrupt, Some)?;
+    let mut session = Session::new(scanning, hand, rows, options.at.json);
+    let recorded = match options.seconds {
+        Some(time) => session.free(time, interrupt),
+        None => session.guided(interrupt),
+    };
+    let done = session.finish();
+    let (rows, written) = file.finish();
+    let ended = recorded.map_err(|gone| match gone {
+        session::Gone::Silent => options.at.silent().into(),
+        session::Gone::NotCalibrated => lost_calibration(options).into(),
+        session::Gone::Ended(error) => error,
+    });
+    let ended = written.and(ended);
+    finish(options, &tell, done, rows, ended)
+}
+
+/// What is left: the file, what it is worth, and what to do with it.
+fn finish(
+    options: &Record,
+    tell: &Tell,
+    done: session::Done,
+    rows: u64,
+    ended: Result<()>,
+) -> Result<()> {
+    let verdict = match rows {
+        0 => Err(nothing(options).into()),
+        _ => recorded::judge(&options.out),
+    };
+    let good = verdict.as_ref().is_ok_and(|verdict| verdict.good) && ended.is_ok();
+    let next = match &verdict {
+        Ok(verdict) if verdict.good => train(options),
+        _ => once_more(options),
+    };
+    let place = options.out.display();
+    if rows > 0 {
+        tell.say(format_args!(
+            "poses      {place}  {rows} poses, {:.1} scans/s, {} scans without a whole pose",
+            done.scanned.scans_per_s, done.passed_over
+        ));
+    }
+    let (judged, verdict) = match verdict {
+        Ok(verdict) => {
+            let judged = match verdict.good {
+                true => Ok(()),
+                false => Err(not_good(options, &verdict).into()),
+            };
+            (judged, Some(verdict))
+        }
+        Err(error) => (Err(error), None),
+    };
+    if let Some(verdict) = verdict.as_ref().filter(|verdict| verdict.good) {
+        let seen: u32 = verdict.movements.iter().map(|seen| seen.times).sum();
+        tell.say(format_args!(
+            "verdict    good enough to train on: {seen} movements of {} kinds",
+            verdict.movements.len()
+        ));
+        tell.say(format_args!("next       {next}"));
+    }
+    // What ended it comes first: the recording is short because of it.
+    let (judgement, failure) = results::judged(ended.and(judged));
+    if options.at.json {
+        let verdict = verdict.unwrap_or_else(|| Verdict {
+            good: false,
+            poses: 0,
+            covers_s: 0.0,
+            movements: Vec::new(),
+            faults: Vec::new(),
+            warnings: Vec::new(),
+        });
+        let result = gloves::Recorded {
+            place: options.at.glove.display().to_string(),
+            poses: (rows > 0).then_some(runs::Poses {
+                path: &options.out,
+                rows,
+            }),
+            covers_s: verdict.covers_s,
+            passed_over: done.passed_over,
+            scanned: done.scanned,
+            movements: verdict.movements,
+            good,
+            lacks: verdict.faults,
+            warnings: verdict.warnings,
+            next,
+            failure,
+        };
+        results::print("record", result)?;
+    }
+    judgement
+}
+
+/// A model's name beside the recording's.
+fn train(options: &Record) -> NextStep {
+    let model = options.out.with_extension("safetensors");
+    Command::gauntlet("train")
+        .path("--poses", &options.out)
+        .path("--out", &model)
+        .into()
+}
+
+/// The same again into another file: this one is never written over.
+fn once_more(options: &Record) -> NextStep {
+    let name = options
+        .out
+        .file_stem()
+        .unwrap_or_default()
+        .to_string_lossy();
+    let other = (2..).map(|n| options.out.with_file_name(format!("{name}_{n}.csv")));
+    let free = other.take(99).find(|path| !path.exists());
+    let free = free.unwrap_or_else(|| options.out.with_extension("again.csv"));
+    let mut command = Command::gauntlet("record")
+        .path("--glove", &options.at.glove)
+        .path("--out", &free);
+    if options.at.ideal {
+        command = command.word("--ideal");
+    }
+    if let Some(profile) = &options.at.profile {
+        command = command.path("--profile", profile);
+    }
+    command.into()
+}
+
+fn not_good(options: &Record, verdict: &Verdict) -> Failure {
+    let what = format!(
+        "the recording {} is not good enough to train on: {}",
+        options.out.display(),
+        verdict.faults.join("; ")
+    );
+    Failure::new(what, once_more(options))
+}
+
+fn nothing(options: &Record) -> Failure {
+    let what = format!(
+        "no pose came, and {} was not left: of no scan all joints were measured",
+        options.out.display()
+    );
+    Failure::new(what, options.at.doctor())
+}
+
+/// Every row needs every sensor.
+fn complete(options: &Record, missing: usize) -> Result<()> {
+    if missing == 0 {
+        return Ok(());
+    }
+    let what = format!(
+        "the glove on {} lacks sensors, and a recording needs every joint",
+        options.at.glove.display()
+    );
+    Err(Failure::new(what, options.at.doctor()).into())
+}
+
+fn not_calibrated(options: &Record, why: &str) -> Failure {
+    let place = options.at.glove.display();
+    let next = NextStep::same(Command::more().word("--ideal"))
+        .then(", for a virtual glove whose sensors sit straight");
+    Failure::new(
+        format!("the glove on {place} is not calibrated: {why}"),
+        next,
+    )
+}
+
+fn lost_calibration(options: &Record) -> Failure {
+    let place = options.at.glove.display();
+    let what = format!(
+        "the glove on {place} is no longer calibrated: the sensor of the hand, or two others, started anew"
+    );
+    Failure::new(what, once_more(options))
+}

@@ -1,0 +1,228 @@
+//! A glove by itself: a hand recorded for `train`, and watched, with no gripper and no model.
+#![allow(missing_docs, clippy::unwrap_used)]
+
+mod support;
+
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Output, Stdio};
+use std::time::Duration;
+
+use support::devices::glove;
+use support::{Simulation, command, finish, interrupt, json, refusal, run, start, text};
+
+/// Rows below the header.
+fn rows(path: &Path) -> usize {
+    std::fs::read_to_string(path).unwrap().lines().count() - 1
+}
+
+/// A result that a failure stands in.
+fn result(output: &Output) -> serde_json::Value {
+    serde_json::from_slice(&output.stdout).expect("standard output is JSON and nothing else")
+}
+
+struct Bench {
+    simulation: Simulation,
+    folder: tempfile::TempDir,
+}
+
+impl Bench {
+    fn new() -> Self {
+        Self {
+            simulation: Simulation::start(true, false),
+            folder: tempfile::tempdir().unwrap(),
+        }
+    }
+
+    fn file(&self, name: &str) -> PathBuf {
+        self.folder.path().join(name)
+    }
+
+    fn arguments(&self, name: &str, more: &[&str]) -> Vec<String> {
+        let path = self.file(name).display().to_string();
+        let glove = self.simulation.glove();
+        let words = ["record", "--glove", &glove, "--out", &path];
+        words.iter().chain(more).map(ToString::to_string).collect()
+    }
+
+    fn record(&self, name: &str, more: &[&str]) -> Child {
+        let arguments = self.arguments(name, more);
+        let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        start(&words)
+    }
+}
+
+/// Reads what is said on standard error until it holds `word`; the rest is read on.
+fn until_said(child: &mut Child, word: &str) -> std::thread::JoinHandle<()> {
+    let mut reader = BufReader::new(child.stderr.take().unwrap());
+    let mut said = String::new();
+    while !said.contains(word) {
+        let read = reader.read_line(&mut said).unwrap();
+        assert!(read > 0, "ended before it said {word}: {said}");
+    }
+    std::thread::spawn(move || drop(std::io::copy(&mut reader, &mut std::io::sink())))
+}
+
+#[test]
+fn what_is_recorded_from_a_virtual_hand_is_what_a_training_takes() {
+    let bench = Bench::new();
+    let output = finish(bench.record("hand.csv", &["--ideal", "--seconds", "20", "--json"]));
+    let said = text(&output.stderr);
+    let result = result(&output);
+    let path = bench.file("hand.csv");
+    assert_eq!(result["result"], "record", "{said}");
+    assert_eq!(result["poses"]["rows"], rows(&path));
+    assert!(result["covers_s"].as_f64().unwrap() > 10.0, "{result}");
+    assert!(result["scans_per_s"].as_f64().unwrap() > 1.0, "{result}");
+    // Half a round of the movements: what is missing is named, and the exit code says so.
+    let good = result["good"].as_bool().unwrap();
+    assert_eq!(
+        output.status.code(),
+        Some(if good { 0 } else { 1 }),
+        "{said}"
+    );
+    assert_eq!(
+        result["lacks"].as_array().unwrap().is_empty(),
+        good,
+        "{result}"
+    );
+    let model = bench.file("model.safetensors");
+    let [poses, model] = [&path, &model].map(|path| path.to_str().unwrap());
+    let trained = run(&[
+        "train", "--poses", poses, "--out", model, "--epochs", "30", "--pairs", "1", "--json",
+    ]);
+    assert_eq!(json(&trained)["model"], model);
+}
+
+#[test]
+fn ctrl_c_ends_a_recording_that_prompts_and_what_came_until_then_is_kept() {
+    let bench = Bench::new();
+    let mut child = bench.record("hand.csv", &["--ideal", "--json"]);
+    let rest = until_said(&mut child, " 1 of 10");
+    std::thread::sleep(Duration::from_secs(3));
+    interrupt(&child);
+    child.stderr = None;
+    let stdout = child.stdout.take().unwrap();
+    let result: serde_json::Value = serde_json::from_reader(stdout).unwrap();
+    assert_eq!(support::wait(&mut child).code(), Some(1));
+    rest.join().unwrap();
+    assert!(result["poses"]["rows"].as_u64().unwrap() > 0, "{result}");
+    assert_eq!(result["poses"]["rows"], rows(&bench.file("hand.csv")));
+    assert_eq!(result["good"], false);
+    let next = result["commands"][0].as_array().unwrap();
+    assert!(
+        next.iter()
+            .any(|word| word.as_str().unwrap().ends_with("hand_2.csv")),
+        "{result}"
+    );
+}
+
+#[test]
+fn without_a_calibration_nothing_is_recorded_and_no_file_is_left() {
+    let bench = Bench::new();
+    let output = finish(bench.record("hand.csv", &["--seconds", "2"]));
+    assert!(refusal(&output, 1).contains("is not calibrated"));
+    assert!(!bench.file("hand.csv").exists());
+}
+
+#[test]
+fn a_file_that_is_there_is_never_written_over() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("hand.csv");
+    std::fs::write(&path, "mine").unwrap();
+    let output = run(&[
+        "record",
+        "--glove",
+        "/nowhere",
+        "--out",
+        path.to_str().unwrap(),
+    ]);
+    assert!(refusal(&output, 2).contains("a recording is never written over"));
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
+}
+
+#[test]
+fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
+    let bench = Bench::new();
+    let arguments = bench.arguments("hand.csv", &["--ideal", "--seconds", "60", "--json"]);
+    let tool = command(&[]).get_program().to_str().unwrap().to_owned();
+    // In blocks of 512 bytes: more than what is tried before, and a few seconds of rows.
+    let limited = format!("ulimit -f 140; exec '{tool}' \"$@\"");
+    let child = std::process::Command::new("sh")
+        .args(["-c", &limited, "sh"])
+        .args(arguments)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let output = finish(child);
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let failure = &result(&output)["failure"];
+    let error = failure["error"].as_str().unwrap();
+    assert!(
+        error.contains("hand.csv") && error.contains("large"),
+        "{error}"
+    );
+    assert!(bench.file("hand.csv").exists());
+}
+
+#[test]
+fn a_glove_is_watched_with_every_sensor_named_and_its_lost_samples_counted() {
+    let (device, _handle, path) = glove(115_200);
+    let child = start(&[
+        "glove",
+        "watch",
+        "--glove",
+        &path,
+        "--seconds",
+        "4",
+        "--json",
+    ]);
+    // A sensor that is away for a moment of it, once all are up.
+    while !device.booted(_handle.clock().now()) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    std::thread::sleep(Duration::from_secs(3));
+    device.unplug(6, true);
+    let result = json(&finish(child));
+    assert_eq!(result["result"], "glove watch");
+    assert_eq!(result["calibrated"], false);
+    let sensors = result["sensors"].as_array().unwrap();
+    assert_eq!(sensors.len(), 16);
+    let ids: std::collections::BTreeSet<_> = sensors.iter().map(|s| s["id"].to_string()).collect();
+    assert_eq!(ids.len(), 16, "{sensors:?}");
+    assert_eq!(sensors[6]["segment"], "index_distal");
+    assert!(sensors[6]["lost"].as_u64().unwrap() > 0, "{}", sensors[6]);
+    assert!(sensors[5]["good"].as_u64().unwrap() > 0, "{}", sensors[5]);
+    assert!(result["scans"].as_u64().unwrap() > 4);
+}
+
+#[test]
+fn a_glove_that_falls_silent_while_it_is_watched_is_a_failure_with_its_next_step() {
+    let (device, handle, path) = glove(115_200);
+    let mut child = start(&[
+        "glove",
+        "watch",
+        "--glove",
+        &path,
+        "--seconds",
+        "8",
+        "--json",
+    ]);
+    let rest = until_said(&mut child, "16 of 16 sensors");
+    device.power(false, handle.clock().now());
+    let stdout = child.stdout.take().unwrap();
+    let result: serde_json::Value = serde_json::from_reader(stdout).unwrap();
+    assert_eq!(support::wait(&mut child).code(), Some(1));
+    rest.join().unwrap();
+    let failure = &result["failure"];
+    assert!(
+        failure["error"]
+            .as_str()
+            .unwrap()
+            .contains("no longer sends frames")
+    );
+    assert_eq!(failure["commands"][0][1], "doctor");
+}
