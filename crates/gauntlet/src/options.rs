@@ -3,8 +3,8 @@
 use std::path::Path;
 use std::time::Duration;
 
-use clap::{Args, ValueEnum};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 
 use host::failure::Failure;
 use host::lines::{Model, Settings};

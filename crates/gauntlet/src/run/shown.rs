@@ -394,7 +394,11 @@ mod tests {
             );
         }
         let held = State::Holding(HoldReason::NotCalibrated);
-        let told = standing(&uncalibrated(Position::Closed, held), &Hands::Keys(Bindings::default())).join("; ");
+        let told = standing(
+            &uncalibrated(Position::Closed, held),
+            &Hands::Keys(Bindings::default()),
+        )
+        .join("; ");
         assert!(told.contains("open the clutch (space)"), "{told}");
         let mut calibrated = idle;
         calibrated.calibration.is_calibrated = true;

@@ -17,7 +17,9 @@ fn the_whole_is_a_file_that_gives_nothing_and_with_every_line_taken_in_gives_eve
     let full: String = text
         .lines()
         .map(|line| {
-            let bare = line.strip_prefix("# ").filter(|bare| bare.contains(" = ") && !bare.contains("hand = \"left\""));
+            let bare = line
+                .strip_prefix("# ")
+                .filter(|bare| bare.contains(" = ") && !bare.contains("hand = \"left\""));
             format!("{}\n", bare.unwrap_or(line))
         })
         .collect();
@@ -25,7 +27,11 @@ fn the_whole_is_a_file_that_gives_nothing_and_with_every_line_taken_in_gives_eve
     for key in KEYS {
         assert!(full.given(key.name).is_some(), "{}", key.name);
         let default = key.default();
-        assert!(default.is_none() || full.value(key.name) == default, "{}", key.name);
+        assert!(
+            default.is_none() || full.value(key.name) == default,
+            "{}",
+            key.name
+        );
         assert!(text.contains(key.help) && SECTIONS.contains(&key.section()));
     }
     assert_eq!(parse(&full.to_toml()).unwrap(), full);
