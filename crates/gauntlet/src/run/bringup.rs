@@ -4,12 +4,14 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::calibration::Try;
+use glove::calibration::Step;
 
 use super::Run;
 use crate::tell::Tell;
 use gripper::Activation;
+use host::calibration::virtual_person::VirtualPerson;
 use host::failure::Failure;
-use host::session::{Order, Snapshot, kept, refused};
+use host::session::{Devices, Order, Snapshot, kept, refused};
 
 /// For a person to lay the hand flat and hold it still.
 pub const WAIT: Duration = Duration::from_secs(30);
@@ -39,6 +41,10 @@ impl Run {
         let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
         self.order(self.flat(wait))?;
         tell.say(format_args!("{ASK}"));
+        let person = self.virtual_person();
+        if let Some(person) = &person {
+            person.ask(Step::FirstFlat);
+        }
         let end = Instant::now() + WAIT + ANSWER_WAIT;
         while Instant::now() < end {
             let left = end.saturating_duration_since(Instant::now());
@@ -49,6 +55,9 @@ impl Run {
             if done {
                 break;
             }
+        }
+        if let Some(person) = &person {
+            person.let_go();
         }
         let now = self.session.snapshot().map(|seen| seen.calibration);
         match now.map(|now| now.newest) {
@@ -65,6 +74,14 @@ impl Run {
                 "the same again",
             )
             .into()),
+        }
+    }
+
+    /// Who does what is asked, where the glove is a virtual person's.
+    fn virtual_person(&self) -> Option<VirtualPerson> {
+        match &self.devices {
+            Devices::Here { glove, .. } => VirtualPerson::at(glove),
+            _ => None,
         }
     }
 

@@ -78,6 +78,7 @@ fn devices(
         image,
         side: Side::Right,
         profile: None,
+        driving: host::session::Driving::default(),
         feed,
     };
     Ok(([glove, gripper], parts))

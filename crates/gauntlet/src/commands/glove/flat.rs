@@ -3,9 +3,11 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use glove::calibration::Step;
 
 use crate::run::{ASK_FLAT, FLAT_WAIT};
 use crate::tell::Tell;
+use host::calibration::virtual_person::VirtualPerson;
 use host::clock::{Clock, ticks};
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -31,6 +33,24 @@ pub(in crate::commands) fn take_flat(
     // What waited is of before.
     scanning.waiting().for_each(drop);
     hand.begin_flat(clock.now(), ticks(FLAT_WAIT));
+    let person = VirtualPerson::at(scanning.port().path());
+    if let Some(person) = &person {
+        person.ask(Step::FirstFlat);
+    }
+    let taken = wait(hand, scanning, clock, tell, interrupt);
+    if let Some(person) = &person {
+        person.let_go();
+    }
+    taken
+}
+
+fn wait(
+    hand: &mut Hand,
+    scanning: &mut Scanning,
+    clock: Clock,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<bool> {
     let mut said = Instant::now();
     loop {
         match scanning.next(ROUND) {
