@@ -106,11 +106,12 @@ impl Rig for OnPort {
     }
 }
 
-const KINDS: [Upset; 8] = [
+const KINDS: [Upset; 9] = [
     Upset::NackAddress,
     Upset::NackData,
     Upset::TimedOut,
     Upset::Ignored,
+    Upset::Mute,
     Upset::Short(0),
     Upset::Short(1),
     Upset::Flipped { byte: 0, bit: 1 },
@@ -243,7 +244,7 @@ impl Run {
     /// Where it cannot go unnoticed.
     fn is_named(&self, upset: Upset) -> bool {
         let noticed = match upset {
-            Upset::NackAddress | Upset::NackData | Upset::TimedOut => true,
+            Upset::NackAddress | Upset::NackData | Upset::TimedOut | Upset::Mute => true,
             Upset::Ignored => self.met.reads > 0,
             Upset::Short(count) => self.met.reads > count,
             // A flipped bit may be a digit of the sample, or what only a second read would tell.

@@ -422,6 +422,11 @@ impl Sensor {
             self.restart(error, now);
             return true;
         }
+        if step == Step::Reset && may_be_done(error) {
+            // It may have reset itself; if not, it is set up without. What stands in its registers is read back either way.
+            (self.step, self.due) = (Some(Step::Configure), after(now, timing::RESET));
+            return false;
+        }
         if step == Step::Verify && self.tries.is_multiple_of(VERIFY_TRIES) {
             // The mode, or what comes before it, may never have been written.
             self.step = Some(Step::Configure);
@@ -437,6 +442,11 @@ fn is_sensors(cause: bus::Error) -> bool {
         cause,
         bus::Error::NoAnswer | bus::Error::Port | bus::Error::Busy
     )
+}
+
+/// Whether the reset was written and only its confirmation is missing.
+fn may_be_done(error: Error) -> bool {
+    matches!(error, Error::Bus { register: imu::register::SYS_TRIGGER, cause } if !cause.is_nack())
 }
 
 fn count(fault: Fault, counters: &mut Counters) {

@@ -32,6 +32,8 @@ pub(super) struct Outcome {
     pub answer: Vec<u8>,
     /// Time on the bus.
     pub takes: Duration,
+    /// Nobody is to be told.
+    pub mute: bool,
 }
 
 /// Speed of the bus.
@@ -91,6 +93,7 @@ impl Bus {
             status,
             answer: Vec::new(),
             takes,
+            mute: false,
         };
         let timed_out = |takes| ended(Status::TimedOut, takes);
         if self.dead {
@@ -103,7 +106,7 @@ impl Bus {
             Some(Upset::NackData) => return Some(ended(Status::NackData, one_byte)),
             Some(Upset::Ignored) => return Some(ended(Status::Done, one_byte)),
             Some(Upset::TimedOut) => return timing.timeout.map(timed_out),
-            Some(Upset::Short(_) | Upset::Flipped { .. }) | None => {}
+            Some(Upset::Short(_) | Upset::Flipped { .. } | Upset::Mute) | None => {}
         }
         let mut message = Message::new(now, timing.bit_ns, self.channels);
         let done = segments
@@ -130,6 +133,7 @@ impl Bus {
             },
             takes: message.spent(),
             answer: message.answer,
+            mute: upset == Some(Upset::Mute),
         })
     }
 

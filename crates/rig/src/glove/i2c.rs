@@ -64,6 +64,9 @@ impl I2c for I2cPort {
             }
             Status::TimedOut => return Err(ErrorKind::Bus),
         }
+        if outcome.mute {
+            return Err(ErrorKind::Other);
+        }
         let mut answer = outcome.answer.into_iter();
         for operation in operations {
             if let Operation::Read(buffer) = operation {

@@ -7,6 +7,7 @@
 use std::collections::VecDeque;
 
 use super::bus::{Bus, Orientation, Segment, Status, Timing};
+use super::upset::MUTE;
 use crate::line::character_ns;
 use crate::{Duration, Instant};
 
@@ -91,6 +92,8 @@ pub(super) struct Sc18im {
     last_byte: Instant,
     /// When the message on the bus ends, and what it answers then.
     busy: Option<(Instant, Vec<u8>)>,
+    /// What it would say before this is not said.
+    mute_until: Option<Instant>,
     /// The bus is dead and the timeout is off.
     hung: bool,
     asleep: bool,
@@ -118,6 +121,7 @@ impl Sc18im {
             fifo: VecDeque::new(),
             last_byte: now,
             busy: None,
+            mute_until: None,
             hung: false,
             asleep: false,
             to_client: VecDeque::new(),
@@ -212,6 +216,9 @@ impl Sc18im {
                 }
                 Some((_, answer)) => self.to_client.extend(answer),
                 None => {}
+            }
+            if self.mute_until.is_some_and(|until| now < until) {
+                self.to_client.clear();
             }
             let Some(byte) = self.fifo.pop_front() else {
                 return;
@@ -329,7 +336,11 @@ impl Sc18im {
                     self.short_answers.1 -= 1;
                     outcome.answer.truncate(self.short_answers.0);
                 }
-                self.busy = Some((now + outcome.takes, outcome.answer));
+                let ends = now + outcome.takes;
+                if outcome.mute {
+                    self.mute_until = Some(ends + MUTE);
+                }
+                self.busy = Some((ends, outcome.answer));
             }
         }
     }

@@ -1,7 +1,11 @@
 //! One message on the I2C bus that goes wrong: which one, how, and whom it met.
 
 use super::VirtualGlove;
+use crate::Duration;
 use crate::clock::lock;
+
+/// How long a bridge is mute that an upset makes so.
+pub(super) const MUTE: Duration = Duration::from_millis(4);
 
 /// How a message on the I2C bus goes wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +20,8 @@ pub enum Upset {
     Ignored,
     /// It is done, but of what it read only so many bytes come: 0 is silence.
     Short(usize),
+    /// It is done, but whoever drives the bus says nothing for 4 ms: no data, no status.
+    Mute,
     /// It is done, but one bit of what it read comes flipped.
     Flipped {
         /// Which byte of the answer; the last one if it has fewer.
@@ -36,7 +42,7 @@ impl Upset {
                     *byte ^= 1 << (bit & 7);
                 }
             }
-            Self::NackAddress | Self::NackData | Self::TimedOut | Self::Ignored => {}
+            Self::NackAddress | Self::NackData | Self::TimedOut | Self::Ignored | Self::Mute => {}
         }
     }
 }
