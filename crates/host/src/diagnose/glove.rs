@@ -52,7 +52,7 @@ pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
             };
             let watch = port.watch();
             let scanner = Scanner::new(port, config);
-            sensors::sensors(scanner, watch, &mut findings, interrupt);
+            sensors::sensors(scanner, address, watch, &mut findings, interrupt);
         }
     }
     findings

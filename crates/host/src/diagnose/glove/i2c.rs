@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use glove::bus::{Batch, Bus, Error, Transaction};
+use glove::bus::{Batch, Bus, Error, Reply, Transaction};
 use glove::mux;
 use glove::scan::{BusScanner, Config};
 
@@ -54,6 +54,7 @@ pub fn glove(address: &Address, interrupt: &Interrupt) -> Findings {
             let watch = port.watch();
             sensors::sensors(
                 BusScanner::on(port, config),
+                answers,
                 watch,
                 &mut findings,
                 interrupt,
@@ -106,13 +107,26 @@ fn multiplexer(port: &mut Port, interrupt: &Interrupt) -> Result<u8, Error> {
 
 /// Reads the control byte, which changes nothing.
 fn ask(port: &mut Port, address: u8, interrupt: &Interrupt) -> Result<(), Error> {
-    let clock = Clock::start();
     let batch = Transaction::read(address, 1)
         .and_then(|read| Batch::from_slice(&[read]).map_err(|_| Error::Unsupported))?;
-    port.start(&batch, clock.now())?;
+    exchange(port, &batch, interrupt).map(drop)
+}
+
+/// Makes a batch and waits for its end.
+pub(super) fn exchange(
+    bus: &mut impl Bus,
+    batch: &Batch,
+    interrupt: &Interrupt,
+) -> Result<Reply, Error> {
+    let clock = Clock::start();
+    let mut begun = false;
     for _ in 0..LOOKS {
-        if let Some(result) = port.poll(clock.now()) {
-            return result.map(|_| ());
+        if !begun && bus.is_up() {
+            bus.start(batch, clock.now())?;
+            begun = true;
+        }
+        if let Some(result) = bus.poll(clock.now()).filter(|_| begun) {
+            return result;
         }
         if interrupt.sleep(LOOK) {
             break;

@@ -1,15 +1,14 @@
 //! What each sensor says of itself, and how still it is while the glove lies.
 
+use glove::bus::{Batch, Bus, Transaction};
 use glove::hand::{Quaternion, SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::{self, Mode, UniqueId, register};
 use glove::scan::Frame;
 
-use super::bridge_chip::WAIT;
-use super::bridge_line::ask;
+use super::i2c::exchange;
 use crate::clock::since;
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;
-use crate::lines::port::Port;
 
 /// CALIB_STAT, ST_RESULT, …, SYS_STATUS, SYS_ERR, UNIT_SEL, a reserved one, OPR_MODE.
 const FIRST: u8 = 0x35;
@@ -96,7 +95,7 @@ impl Lying {
 
 /// Asks each sensor what it says of itself, and tells it with how it lay.
 pub(super) fn tell(
-    port: &mut Port,
+    bus: &mut impl Bus,
     mux: u8,
     ids: &[Option<UniqueId>; SEGMENT_COUNT],
     lying: &Lying,
@@ -108,7 +107,7 @@ pub(super) fn tell(
         if interrupt.asked() {
             return findings.note("sensors", "interrupted", "again");
         }
-        match registers(port, mux, k, interrupt) {
+        match registers(bus, mux, k, interrupt) {
             Some(read) => one(k, id.as_ref(), &read, rest, findings),
             None => findings.note(
                 "sensors",
@@ -130,17 +129,13 @@ pub(super) fn tell(
 }
 
 /// Nine registers of sensor `k`.
-fn registers(port: &mut Port, mux: u8, k: usize, interrupt: &Interrupt) -> Option<[u8; COUNT]> {
-    let address = imu::address(k) << 1;
-    let question = [
-        &[0x53, mux << 1, 1, 1 << imu::channel(k)][..],
-        &[0x53, address, 1, FIRST],
-        &[0x53, address | 1, COUNT as u8, 0x50],
-    ]
-    .concat();
+fn registers(bus: &mut impl Bus, mux: u8, k: usize, interrupt: &Interrupt) -> Option<[u8; COUNT]> {
+    let select = Transaction::write(mux, &[1 << imu::channel(k)]).ok()?;
+    let read = Transaction::write_read(imu::address(k), &[FIRST], COUNT).ok()?;
+    let batch = Batch::from_slice(&[select, read]).ok()?;
     (0..TRIES).find_map(|_| {
-        let heard = ask(port, &question, COUNT, WAIT, interrupt);
-        heard.try_into().ok()
+        let read = exchange(bus, &batch, interrupt).ok()?;
+        read.as_slice().try_into().ok()
     })
 }
 

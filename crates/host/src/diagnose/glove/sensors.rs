@@ -29,9 +29,10 @@ const LYING: Duration = Duration::from_secs(3);
 /// The longest wait between two looks.
 const LOOK: glove::Duration = glove::Duration::from_millis(1);
 
-/// Brings the sensors up and looks which of them give orientations.
+/// Brings the sensors up behind the multiplexer at `mux`, and looks which of them give orientations.
 pub fn sensors<B: Bus>(
     mut scanner: BusScanner<B>,
+    mux: u8,
     watch: Watch,
     findings: &mut Findings,
     interrupt: &Interrupt,
@@ -108,7 +109,7 @@ pub fn sensors<B: Bus>(
         let lying = watch_lying(&mut scanner, &mut pc, interrupt);
         let ids = scanner.ids();
         own::tell(
-            &mut scanner.release(),
+            &mut scanner.into_bus(),
             mux,
             &ids,
             &lying,
@@ -119,7 +120,11 @@ pub fn sensors<B: Bus>(
 }
 
 /// How the sensors are while nobody is asked to move.
-fn watch_lying(scanner: &mut Scanner<Port>, pc: &mut Pc, interrupt: &Interrupt) -> own::Lying {
+fn watch_lying<B: Bus>(
+    scanner: &mut BusScanner<B>,
+    pc: &mut Pc,
+    interrupt: &Interrupt,
+) -> own::Lying {
     let mut lying = own::Lying::default();
     let end = Instant::now() + LYING;
     while Instant::now() < end && !interrupt.asked() {
