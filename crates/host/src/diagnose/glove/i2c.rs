@@ -222,7 +222,7 @@ mod tests {
         let port = port.expect("a thread");
         let (watch, mut findings) = (port.watch(), Findings::default());
         let scanner = BusScanner::on(port, Config::default());
-        sensors::sensors(scanner, watch, &mut findings, &interrupt());
+        sensors::sensors(scanner, mux::ADDRESS, watch, &mut findings, &interrupt());
         assert_eq!(findings.faults(), 1, "{findings:?}");
         let wrong = findings.first_wrong().expect("one");
         assert!(wrong.what.contains("channel 4, address 0x29"), "{wrong:?}");
