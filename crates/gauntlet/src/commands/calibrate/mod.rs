@@ -220,7 +220,7 @@ fn next(glove: &Path) -> NextStep {
     Command::gauntlet("record")
         .path("--glove", glove)
         .option("--out", "my_hand.csv")
-        .then(" records the hand for `train`")
+        .then(" records the hand, to train a map on")
 }
 
 /// Whether it is kept. `agreed`: the person saw the verdict and wants it.
