@@ -132,7 +132,7 @@ fn a_sensor_that_restarts_costs_the_joints_beside_it_until_its_heading_is_found(
     let wearer = Wearer::new(1);
     let (mut bench, person) = following(&wearer);
     bench.run(15 * S);
-    let others = (1 << 25) - 1 & !BESIDE_13;
+    let others = ((1 << 25) - 1) & !BESIDE_13;
     bench.glove.reset_sensor(13, bench.clock.now());
     let (mut held, mut frames, mut since) = (0, 0, None);
     let (begun, mut seen) = (bench.now(), bench.app.telemetry().frame_sequence);
