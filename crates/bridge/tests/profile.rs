@@ -330,3 +330,16 @@ fn a_bent_or_moving_hand_is_no_flat_pose() {
     assert!(matches!(refused, Refusal::Moving { .. }), "{refused:?}");
     assert!(!bench.app.telemetry().calibration.is_calibrated);
 }
+
+#[test]
+fn a_sensor_that_creeps_far_beyond_what_a_finger_does_is_named_and_held() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    for _ in 0..45 {
+        bench.glove.slip(14, [1.0, 0.0, 0.0], 4.0);
+        bench.run(100 * MS);
+    }
+    let telemetry = bench.app.telemetry();
+    assert_eq!(telemetry.impossible, 1 << 14);
+    assert_eq!(telemetry.held_joints, 0b11 << 23);
+    assert_eq!(bench.state(), State::Following);
+}
