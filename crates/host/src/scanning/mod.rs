@@ -10,7 +10,7 @@ mod snapshot;
 mod worker;
 
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, sync_channel};
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
@@ -130,10 +130,7 @@ impl Scanning {
 
     /// The next scan, waited for by `time` at most. `None` when none came, or the reading has ended.
     pub fn next(&self, time: Duration) -> Option<Scanned> {
-        match self.frames.recv_timeout(time) {
-            Ok(scanned) => Some(scanned),
-            Err(RecvTimeoutError::Timeout | RecvTimeoutError::Disconnected) => None,
-        }
+        self.frames.recv_timeout(time).ok()
     }
 
     /// The scans that wait, without waiting for more; at most [`Settings::queue`].
