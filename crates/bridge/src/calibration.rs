@@ -51,8 +51,8 @@ impl ProfileState {
 impl core::fmt::Display for Lack {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
-            Self::Profile => "there is no profile of this glove: `gauntlet calibrate` makes one",
-            Self::OwnProfile => "the profile is of another glove, or no sensor answers: `gauntlet calibrate` makes one of this glove",
+            Self::Profile => "there is no profile of this glove: calibrating it makes one",
+            Self::OwnProfile => "the profile is of another glove, or no sensor answers: calibrating it makes one of this glove",
             Self::FlatPose => "the headings are not known: open the clutch, lay the hand flat and hold it for two seconds",
         })
     }
@@ -139,7 +139,7 @@ impl core::fmt::Display for Refusal {
             Self::NoProfile => return write!(f, "{}", Lack::Profile),
             Self::OtherGlove => {
                 return f.write_str(
-                    "the profile is of another glove: `gauntlet calibrate` makes one of this",
+                    "the profile is of another glove: calibrating it makes one of this",
                 );
             }
             Self::Tilted { segment, by } => {
