@@ -76,8 +76,16 @@ fn what_is_recorded_from_a_virtual_hand_is_what_a_training_takes() {
     assert!(result["scans_per_s"].as_f64().unwrap() > 1.0, "{result}");
     // Half a round of the movements: what is missing is named, and the exit code says so.
     let good = result["good"].as_bool().unwrap();
-    assert_eq!(output.status.code(), Some(if good { 0 } else { 1 }), "{said}");
-    assert_eq!(result["lacks"].as_array().unwrap().is_empty(), good, "{result}");
+    assert_eq!(
+        output.status.code(),
+        Some(if good { 0 } else { 1 }),
+        "{said}"
+    );
+    assert_eq!(
+        result["lacks"].as_array().unwrap().is_empty(),
+        good,
+        "{result}"
+    );
     let model = bench.file("model.safetensors");
     let [poses, model] = [&path, &model].map(|path| path.to_str().unwrap());
     let trained = run(&[
@@ -102,7 +110,11 @@ fn ctrl_c_ends_a_recording_that_prompts_and_what_came_until_then_is_kept() {
     assert_eq!(result["poses"]["rows"], rows(&bench.file("hand.csv")));
     assert_eq!(result["good"], false);
     let next = result["commands"][0].as_array().unwrap();
-    assert!(next.iter().any(|word| word.as_str().unwrap().ends_with("hand_2.csv")), "{result}");
+    assert!(
+        next.iter()
+            .any(|word| word.as_str().unwrap().ends_with("hand_2.csv")),
+        "{result}"
+    );
 }
 
 #[test]
@@ -118,7 +130,13 @@ fn a_file_that_is_there_is_never_written_over() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("hand.csv");
     std::fs::write(&path, "mine").unwrap();
-    let output = run(&["record", "--glove", "/nowhere", "--out", path.to_str().unwrap()]);
+    let output = run(&[
+        "record",
+        "--glove",
+        "/nowhere",
+        "--out",
+        path.to_str().unwrap(),
+    ]);
     assert!(refusal(&output, 2).contains("a recording is never written over"));
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
 }
@@ -143,14 +161,25 @@ fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
     assert_eq!(output.status.code(), Some(1), "{said}");
     let failure = &result(&output)["failure"];
     let error = failure["error"].as_str().unwrap();
-    assert!(error.contains("hand.csv") && error.contains("large"), "{error}");
+    assert!(
+        error.contains("hand.csv") && error.contains("large"),
+        "{error}"
+    );
     assert!(bench.file("hand.csv").exists());
 }
 
 #[test]
 fn a_glove_is_watched_with_every_sensor_named_and_its_lost_samples_counted() {
     let (device, _handle, path) = glove(115_200);
-    let child = start(&["glove", "watch", "--glove", &path, "--seconds", "4", "--json"]);
+    let child = start(&[
+        "glove",
+        "watch",
+        "--glove",
+        &path,
+        "--seconds",
+        "4",
+        "--json",
+    ]);
     // A sensor that is away for a moment of it, once all are up.
     while !device.booted(_handle.clock().now()) {
         std::thread::sleep(Duration::from_millis(20));
@@ -173,7 +202,15 @@ fn a_glove_is_watched_with_every_sensor_named_and_its_lost_samples_counted() {
 #[test]
 fn a_glove_that_falls_silent_while_it_is_watched_is_a_failure_with_its_next_step() {
     let (device, handle, path) = glove(115_200);
-    let mut child = start(&["glove", "watch", "--glove", &path, "--seconds", "8", "--json"]);
+    let mut child = start(&[
+        "glove",
+        "watch",
+        "--glove",
+        &path,
+        "--seconds",
+        "8",
+        "--json",
+    ]);
     let rest = until_said(&mut child, "16 of 16 sensors");
     device.power(false, handle.clock().now());
     let stdout = child.stdout.take().unwrap();
@@ -181,6 +218,11 @@ fn a_glove_that_falls_silent_while_it_is_watched_is_a_failure_with_its_next_step
     assert_eq!(support::wait(&mut child).code(), Some(1));
     rest.join().unwrap();
     let failure = &result["failure"];
-    assert!(failure["error"].as_str().unwrap().contains("no longer sends frames"));
+    assert!(
+        failure["error"]
+            .as_str()
+            .unwrap()
+            .contains("no longer sends frames")
+    );
     assert_eq!(failure["commands"][0][1], "doctor");
 }

@@ -411,10 +411,7 @@ fn results_of_gloves_keep_their_names() {
     };
     golden(
         "gloves.json",
-        &[
-            sample("glove watch", watched),
-            sample("record", recorded),
-        ],
+        &[sample("glove watch", watched), sample("record", recorded)],
     );
 }
 

@@ -1,16 +1,17 @@
 //! What the hand in a glove does: joint angles from scans, once the glove is calibrated.
 //!
 //! Two ways to be calibrated, each completed by one flat pose: *ideal sensors*, which sit straight and share one heading (virtual
-//! gloves), and a *profile*, which says how this glove's sensors sit on this hand ([`glove::calibration::Profile`]).
+//! gloves), and a *profile*, which says how this glove's sensors sit on this hand. The angles are those that would drive a gripper
+//! ([`bridge::posture`]).
 
-use bridge::posture::missing;
-use glove::calibration::{Align, Profile};
+use bridge::posture::Posture;
+use glove::calibration::{Bound, Misfit};
 use glove::hand::flat::{FlatHand, Progress};
-use glove::hand::{self, Calibration, JOINT_COUNT, Quaternion, SEGMENT_COUNT, Side, beyond};
-use glove::headings::{Config, Headings};
+use glove::hand::{JOINT_COUNT, SEGMENT_COUNT, Side};
 use glove::scan::Frame;
 
 use super::Scanned;
+use crate::clock::since;
 
 /// All joints, as a bit mask.
 const ALL: u32 = (1 << JOINT_COUNT) - 1;
@@ -18,19 +19,19 @@ const ALL: u32 = (1 << JOINT_COUNT) - 1;
 /// The hand in one scan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pose {
-    /// When, on the clock of the scans.
+    /// When the scan was complete.
     pub at: glove::Instant,
-    /// Joint angles, radians, in the order of [`hand::JOINT_NAMES`].
+    /// Joint angles, radians, in the order of [`glove::hand::JOINT_NAMES`].
     pub angles: [f32; JOINT_COUNT],
-    /// Joints that this scan does not show (bit j): a sensor beside them is missing, has started anew, or turns as no hand does. All,
-    /// where the glove is not calibrated; the angles are then those of sensors that sit straight.
+    /// Joints that this scan does not show (bit j): a sensor beside them is missing, has started anew, or turns as no hand does; or the
+    /// heading is not sure. All, where the glove is not calibrated; the angles are then those of sensors that sit straight.
     pub held: u32,
 }
 
 impl Pose {
     /// Whether every joint was measured.
     pub fn is_whole(&self) -> bool {
-        self.held == 0 && self.angles.iter().all(|angle| angle.is_finite())
+        self.held == 0
     }
 }
 
@@ -51,68 +52,38 @@ pub enum Flat {
 /// A hand whose glove is read.
 #[derive(Debug, Clone)]
 pub struct Hand {
-    way: Way,
+    posture: Posture,
     flat: Flat,
-    pose: Option<FlatHand>,
+    /// The flat pose under way, and when its time is over.
+    pose: Option<(FlatHand, glove::Instant)>,
     /// How often each sensor had started, as wired; `None` before the first scan.
     starts: Option<[u16; SEGMENT_COUNT]>,
-}
-
-#[derive(Debug, Clone)]
-enum Way {
-    Straight(Straight),
-    Profile(Box<Seated>),
-}
-
-/// Ideal sensors.
-#[derive(Debug, Clone)]
-struct Straight {
-    side: Side,
-    calibration: Option<Calibration>,
-    /// Segments whose sensor started anew since the flat pose (bit k).
-    astray: u16,
-}
-
-/// Sensors that sit as a profile says.
-#[derive(Debug, Clone)]
-struct Seated {
-    align: Align,
-    headings: Headings,
-    /// A flat pose was taken.
-    is_posed: bool,
 }
 
 impl Hand {
     /// A glove whose sensors sit straight on their segments and share one heading.
     pub fn ideal(side: Side) -> Self {
-        Self::with(Way::Straight(Straight {
-            side,
-            calibration: None,
-            astray: 0,
-        }))
-    }
-
-    /// A glove whose sensors sit as `profile` says.
-    pub fn with_profile(profile: &Profile) -> Self {
-        Self::with(Way::Profile(Box::new(Seated {
-            align: Align::new(),
-            headings: Headings::new(profile, Config::default()),
-            is_posed: false,
-        })))
-    }
-
-    fn with(way: Way) -> Self {
         Self {
-            way,
+            posture: Posture::new(side, None),
             flat: Flat::None,
             pose: None,
             starts: None,
         }
     }
 
+    /// A glove whose sensors sit as its profile says.
+    pub fn with_profile(profile: &Bound) -> Self {
+        let mut hand = Self::ideal(profile.profile.side);
+        hand.posture.set_profile(Some(profile));
+        hand
+    }
+
     /// From `now` on the hand lies flat: taken as soon as it was still for a second, within `wait`.
     pub fn begin_flat(&mut self, now: glove::Instant, wait: glove::Duration) {
-        self.pose = Some(FlatHand::start(now, wait, &self.way.seating()));
+        self.posture.cancel_pose(now);
+        let seating = self.posture.seating().unwrap_or_default();
+        let until = now.checked_add_duration(wait).unwrap_or(now);
+        self.pose = Some((FlatHand::start(now, wait, &seating), until));
         self.flat = Flat::Waiting(None);
     }
 
@@ -123,186 +94,160 @@ impl Hand {
 
     /// Whether a flat pose was taken, and the sensors' headings are known since.
     pub fn is_calibrated(&self) -> bool {
-        match &self.way {
-            Way::Straight(way) => {
-                way.calibration.is_some() && way.astray & 1 == 0 && way.astray.count_ones() < 2
-            }
-            Way::Profile(way) => way.is_posed && way.headings.unknown().count_ones() < OF_THE_HAND,
-        }
+        self.posture.is_calibrated()
+    }
+
+    /// Whether the profile is this glove's; `None` without one.
+    pub fn fit(&self) -> Option<Result<(), Misfit>> {
+        self.posture.fit()
     }
 
     /// Standard deviation of each joint's heading, by segment, radians; `None` where no profile says.
     pub fn sigma(&self) -> Option<[f32; SEGMENT_COUNT]> {
-        match &self.way {
-            Way::Straight(_) => None,
-            Way::Profile(way) => Some(way.headings.sigma()),
-        }
+        self.posture.headings().map(|headings| headings.sigma())
     }
 
     /// Takes a scan.
     pub fn take(&mut self, scanned: &Scanned) -> Pose {
-        self.see_starts(scanned);
-        let begun_anew = self.look_for_flat(scanned);
-        match &mut self.way {
-            Way::Straight(way) => way.pose(&scanned.frame, scanned.at),
-            Way::Profile(way) => {
-                if begun_anew {
-                    way.headings.begin_flat();
-                }
-                let pose = way.pose(&scanned.frame);
-                if self.flat == Flat::Waiting(None) && self.pose.is_none() {
-                    self.flat = match way.headings.end_flat(scanned.at) {
-                        Ok(_) => {
-                            way.is_posed = true;
-                            Flat::Taken
-                        }
-                        Err(why) => Flat::Refused(why.to_string()),
-                    };
-                }
-                pose
-            }
+        let at = scanned.at;
+        self.hear(scanned);
+        let frame = self.posture.placed(&scanned.frame);
+        let frame = frame.as_ref().unwrap_or(&scanned.frame);
+        let was_flat = self.look_for_flat(frame, at);
+        let read = self.posture.read(frame);
+        if was_flat {
+            self.end_pose(at);
+        }
+        match read {
+            Ok(reading) => Pose {
+                at,
+                angles: reading.angles,
+                held: if self.is_calibrated() {
+                    reading.held
+                } else {
+                    ALL
+                },
+            },
+            Err(_) => Pose {
+                at,
+                angles: *self.posture.angles(),
+                held: ALL,
+            },
         }
     }
 
-    fn see_starts(&mut self, scanned: &Scanned) {
+    /// Sensors that started since the scan before: whose they are, and that their headings are others.
+    fn hear(&mut self, scanned: &Scanned) {
         let before = self.starts.replace(scanned.starts);
-        let Some(before) = before else { return };
-        for k in (0..SEGMENT_COUNT).filter(|&k| before[k] != scanned.starts[k]) {
-            match &mut self.way {
-                Way::Straight(way) => way.astray |= 1 << k,
-                Way::Profile(way) => {
-                    way.align.forget(k);
-                    way.headings.restarted(k, scanned.at);
-                }
+        if before != Some(scanned.starts) {
+            self.posture.meet(&scanned.ids);
+        }
+        if self.posture.calibration().is_some()
+            && let Some(before) = before
+        {
+            for k in (0..SEGMENT_COUNT).filter(|&k| before[k] != scanned.starts[k]) {
+                self.posture.distrust(k, scanned.at);
             }
         }
+        self.posture.hear(&scanned.starts, true, scanned.at);
     }
 
-    /// Whether the second of stillness begins (anew) with this scan. The one that ends it leaves [`Flat::Waiting`] without a pose under
-    /// way, where the headings are still to be taken.
-    fn look_for_flat(&mut self, scanned: &Scanned) -> bool {
-        let Some(pose) = &mut self.pose else {
+    /// Whether the hand was flat and still for long enough by this frame, where a profile's headings are to be taken of it.
+    fn look_for_flat(&mut self, frame: &Frame, at: glove::Instant) -> bool {
+        let Some((pose, _)) = &mut self.pose else {
             return false;
         };
-        let frame = self.way.placed(&scanned.frame);
-        match pose.take(&frame, scanned.at) {
-            Progress::Waiting { still, obstacle } => {
-                self.flat = Flat::Waiting(obstacle.map(|why| why.to_string()));
-                still.as_ticks() == 0
-            }
-            Progress::Done(calibration) => {
-                self.pose = None;
-                self.flat = match &mut self.way {
-                    Way::Straight(way) => {
-                        (way.calibration, way.astray) = (Some(calibration), 0);
-                        Flat::Taken
-                    }
-                    Way::Profile(_) => Flat::Waiting(None),
-                };
-                false
-            }
-            Progress::Refused(why) => {
-                self.pose = None;
-                self.flat = Flat::Refused(why.to_string());
-                false
-            }
+        let began = pose.began();
+        let progress = pose.take(frame, at);
+        let is_new = pose.began() != began;
+        let has_profile = self.posture.fit().is_some();
+        if has_profile && is_new {
+            self.posture.begin_pose();
         }
+        match progress {
+            Progress::Done(_) if has_profile => return true,
+            Progress::Done(calibration) => {
+                self.posture.calibrate(Some(calibration));
+                self.pose = None;
+                self.flat = Flat::Taken;
+            }
+            progress => self.follow(progress, at),
+        }
+        false
+    }
+
+    fn follow(&mut self, progress: Progress, at: glove::Instant) {
+        match progress {
+            Progress::Waiting { obstacle, .. } => {
+                self.flat = Flat::Waiting(obstacle.map(|why| why.to_string()));
+            }
+            Progress::Refused(why) => self.refuse(why.to_string(), at),
+            Progress::Done(_) => {}
+        }
+    }
+
+    /// The headings of the pose, or the same again as long as there is time.
+    fn end_pose(&mut self, at: glove::Instant) {
+        let Some((_, until)) = self.pose.take() else {
+            return;
+        };
+        if let Some(Err(misfit)) = self.posture.fit() {
+            return self.refuse(misfit.to_string(), at);
+        }
+        match self.posture.end_pose(at) {
+            Ok(_) => self.flat = Flat::Taken,
+            Err(why) if at < until => {
+                self.begin_flat(at, since(until, at));
+                self.flat = Flat::Waiting(Some(why.to_string()));
+            }
+            Err(why) => self.refuse(why.to_string(), at),
+        }
+    }
+
+    fn refuse(&mut self, why: String, at: glove::Instant) {
+        self.pose = None;
+        self.posture.cancel_pose(at);
+        self.flat = Flat::Refused(why);
     }
 
     /// The time of a flat pose passes without a scan, too.
     pub fn pass(&mut self, now: glove::Instant) {
-        if let Some(pose) = &self.pose
-            && let Progress::Refused(why) = pose.progress(now)
-        {
-            self.pose = None;
-            self.flat = Flat::Refused(why.to_string());
-        }
-    }
-}
-
-/// So many joints without a heading are none of single sensors: the hand's own sensor, or no flat pose.
-const OF_THE_HAND: u32 = 3;
-
-impl Way {
-    /// How the sensors sit by what is known before a flat pose, by segment.
-    fn seating(&self) -> Calibration {
-        match self {
-            Way::Straight(way) => way.calibration.unwrap_or_default(),
-            Way::Profile(way) => {
-                let profile = way.headings.profile();
-                let mounting = std::array::from_fn(|k| {
-                    // The thumb's frames count from its base.
-                    let base = match (1..4).contains(&k) {
-                        true => profile.thumb_base,
-                        false => Quaternion::identity(),
-                    };
-                    base * profile.mounting[k]
-                });
-                Calibration::from_mounting(mounting)
+        if let Some((pose, _)) = &self.pose {
+            let progress = pose.progress(now);
+            if matches!(progress, Progress::Refused(_)) {
+                self.follow(progress, now);
             }
         }
     }
-
-    /// The frame by segment.
-    fn placed(&self, frame: &Frame) -> Frame {
-        match self {
-            Way::Straight(_) => *frame,
-            Way::Profile(way) => {
-                let seats = way.headings.profile().sensors;
-                let sample = |seat: u8| frame.samples[usize::from(seat) % SEGMENT_COUNT];
-                Frame {
-                    samples: seats.map(sample),
-                    sequence: frame.sequence,
-                }
-            }
-        }
-    }
-}
-
-impl Straight {
-    fn pose(&self, frame: &Frame, at: glove::Instant) -> Pose {
-        let orientations = frame.orientations();
-        let calibration = self.calibration.unwrap_or_default();
-        let angles = hand::joint_angles(&orientations, &calibration, self.side);
-        let lost = missing(frame) | self.astray;
-        let mut held = match self.calibration {
-            Some(_) => beside(lost),
-            None => ALL,
-        };
-        let excess = beyond::excess(&orientations, &calibration, self.side, &angles);
-        for (segment, excess) in excess.iter().enumerate() {
-            if *excess > beyond::FAR {
-                held |= hand::joints_of_segment(segment);
-            }
-        }
-        Pose { at, angles, held }
-    }
-}
-
-impl Seated {
-    fn pose(&mut self, frame: &Frame) -> Pose {
-        let reading = self.headings.take(&self.align.take(frame));
-        Pose {
-            at: reading.at,
-            angles: reading.angles,
-            held: if self.is_posed { reading.held } else { ALL },
-        }
-    }
-}
-
-/// The joints beside these segments, as a bit mask.
-fn beside(segments: u16) -> u32 {
-    let lost = (0..SEGMENT_COUNT).filter(|k| segments >> k & 1 == 1);
-    lost.fold(0, |mask, k| mask | hand::joints_of_segment(k))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glove::hand::{JOINT_NAMES, segment_orientations};
+    use glove::calibration::Profile;
+    use glove::hand::{self, JOINT_NAMES, Quaternion, segment_orientations};
+    use glove::imu::UniqueId;
     use glove::scan::{Health, Sample};
 
     const SCAN_US: u64 = 28_000;
+
+    const IDS: [UniqueId; SEGMENT_COUNT] = {
+        let mut ids = [[7; 16]; SEGMENT_COUNT];
+        let mut k = 0;
+        while k < SEGMENT_COUNT {
+            ids[k][0] = k as u8;
+            k += 1;
+        }
+        ids
+    };
+
+    /// A profile of a glove whose sensors sit straight.
+    fn bound() -> Bound {
+        Bound {
+            profile: Profile::straight(Side::Right),
+            ids: IDS,
+        }
+    }
 
     /// Scans of a hand whose joints are at `angles`.
     fn scans(
@@ -326,7 +271,12 @@ mod tests {
                     samples,
                     sequence: scan as u32,
                 };
-                hand.take(&Scanned { frame, at, starts })
+                hand.take(&Scanned {
+                    frame,
+                    at,
+                    starts,
+                    ids: IDS.map(Some),
+                })
             })
             .collect()
     }
@@ -343,8 +293,7 @@ mod tests {
     #[test]
     fn without_a_flat_pose_no_joint_is_measured_and_with_one_all_are() {
         let straight = [Quaternion::identity(); SEGMENT_COUNT];
-        let profile = Profile::straight(Side::Right);
-        for mut hand in [Hand::ideal(Side::Right), Hand::with_profile(&profile)] {
+        for mut hand in [Hand::ideal(Side::Right), Hand::with_profile(&bound())] {
             let flat = |_| [0.0; JOINT_COUNT];
             let before = scans(&mut hand, 0, 10, &straight, [1; 16], flat);
             assert!(
@@ -372,7 +321,7 @@ mod tests {
         // Palm down: the segment's y is the world's up.
         let down = Quaternion::from_euler_angles(std::f32::consts::FRAC_PI_2, 0.0, 0.0);
         let turned = std::array::from_fn(|k| about_up(k) * down);
-        let mut hand = Hand::with_profile(&Profile::straight(Side::Right));
+        let mut hand = Hand::with_profile(&bound());
         begin(&mut hand, 0);
         scans(&mut hand, 0, 45, &turned, [1; 16], |_| [0.0; JOINT_COUNT]);
         assert_eq!(hand.flat(), &Flat::Taken);
@@ -420,5 +369,21 @@ mod tests {
         let mut hand = calibrated();
         scans(&mut hand, 45, 1, &straight, started(0), flat);
         assert!(!hand.is_calibrated());
+    }
+    #[test]
+    fn a_profile_of_another_glove_calibrates_nothing_and_says_so() {
+        let still = [Quaternion::identity(); SEGMENT_COUNT];
+        let mut other = bound();
+        other.ids[3][1] = 99;
+        let mut hand = Hand::with_profile(&other);
+        begin(&mut hand, 0);
+        let poses = scans(&mut hand, 0, 45, &still, [1; 16], |_| [0.0; JOINT_COUNT]);
+        assert!(matches!(hand.flat(), Flat::Refused(_)), "{:?}", hand.flat());
+        assert!(!hand.is_calibrated() && poses.iter().all(|pose| !pose.is_whole()));
+        assert!(
+            matches!(hand.fit(), Some(Err(Misfit::Differ(_)))),
+            "{:?}",
+            hand.fit()
+        );
     }
 }

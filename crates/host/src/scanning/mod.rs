@@ -17,6 +17,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use glove::hand::SEGMENT_COUNT;
+use glove::imu::UniqueId;
 use glove::scan::{self, Finding, Frame};
 
 use crate::clock::Clock;
@@ -43,6 +44,8 @@ pub struct Scanned {
     pub at: glove::Instant,
     /// [`scan::Counters::starts`] at that time.
     pub starts: [u16; SEGMENT_COUNT],
+    /// The sensors' unique ids as they were read by then, as wired.
+    pub ids: [Option<UniqueId>; SEGMENT_COUNT],
 }
 
 /// How a glove is read.

@@ -58,6 +58,7 @@ impl Worker {
                     frame,
                     at: now,
                     starts: self.scanner.counters().starts,
+                    ids: self.scanner.ids(),
                 };
                 // Full: whoever takes them is late, which is counted; gone: nobody wants them.
                 let taken = self.hand.try_send(scanned).is_ok();

@@ -70,6 +70,12 @@ fn next(why: Refusal, devices: &Devices) -> NextStep {
             devices.bridge("bridge release"),
             " where another host left it closed",
         ),
+        Refusal::Tilted { .. } => {
+            "the same again, the palm on a table and the fingers stretched; then the seat of that sensor".into()
+        }
+        Refusal::NoProfile | Refusal::OtherGlove => {
+            "calibrating this glove, which makes its profile".into()
+        }
         Refusal::NothingBefore => "calibrating on a flat hand".into(),
     }
 }

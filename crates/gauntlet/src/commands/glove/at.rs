@@ -8,6 +8,7 @@ use glove::hand::Side;
 
 use crate::commands::teleop::Hand as WhichHand;
 use crate::tell::Tell;
+use host::calibration::{Found, Kept, ProfileStore};
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -22,10 +23,13 @@ pub struct GloveAt {
     /// The glove's serial port.
     #[arg(long, value_name = "PORT")]
     pub glove: PathBuf,
+    /// The glove's profile, if not the one that is found by its sensors' ids.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "ideal")]
+    pub profile: Option<PathBuf>,
     /// Take the sensors as ideal: sewn on straight, with one heading. One flat pose then calibrates them. Virtual gloves only.
     #[arg(long)]
     pub ideal: bool,
-    /// Which hand wears the glove.
+    /// Which hand wears the glove, where no profile says.
     #[arg(long, value_enum, default_value_t = WhichHand::Right)]
     pub hand: WhichHand,
     /// Print the result as JSON on standard output, and nothing else there.
@@ -36,8 +40,8 @@ pub struct GloveAt {
 /// A glove that is read, and the hand in it.
 pub(in crate::commands) struct Opened {
     pub scanning: Scanning,
-    /// `None`: nobody knows how its sensors sit.
-    pub hand: Option<Hand>,
+    /// Else why nobody knows how its sensors sit.
+    pub hand: Result<Hand, String>,
     /// Sensors that give no orientation.
     pub missing: usize,
 }
@@ -81,12 +85,41 @@ impl GloveAt {
                 tell.say(format_args!("  try: {next}"));
             }
         }
-        let hand = self.ideal.then(|| Hand::ideal(self.side()));
+        let hand = self.known(&scanning, tell)?;
         Ok(Opened {
             scanning,
             hand,
             missing: missing.faults(),
         })
+    }
+
+    /// The hand in it, by ideal sensors or by a profile; else why there is none.
+    fn known(&self, scanning: &Scanning, tell: &Tell) -> Result<Result<Hand, String>> {
+        if self.ideal {
+            return Ok(Ok(Hand::ideal(self.side())));
+        }
+        let ids = scanning.snapshot().map_or([None; 16], |seen| seen.ids());
+        let (path, kept) = match &self.profile {
+            Some(path) => (path.clone(), Box::new(Kept::read(path)?)),
+            None => match ProfileStore::usual()?.find(&ids)? {
+                Found::Fits(path, kept) => (path, kept),
+                Found::Nearly(path, misfit) => {
+                    return Ok(Err(format!("{}: {misfit}", path.display())));
+                }
+                Found::Untold(misfit) => return Ok(Err(misfit.to_string())),
+                Found::Nothing => return Ok(Err("there is no profile of it".to_owned())),
+            },
+        };
+        if let Err(misfit) = kept.bound.fits(&ids) {
+            return Ok(Err(format!("{}: {misfit}", path.display())));
+        }
+        tell.say(format_args!(
+            "profile  {}  of {}, {}",
+            path.display(),
+            kept.calibrated,
+            kept.quality.verdict
+        ));
+        Ok(Ok(Hand::with_profile(&kept.bound)))
     }
 
     /// Which hand wears it.

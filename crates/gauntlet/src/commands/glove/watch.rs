@@ -44,8 +44,8 @@ pub(super) fn run(options: &Watch, interrupt: &Interrupt) -> Result<()> {
     let clock = Clock::start();
     let opened = at.open(&tell, clock, interrupt)?;
     let mut watching = Watching {
-        known: opened.hand.is_some(),
-        hand: opened.hand.unwrap_or_else(|| Hand::ideal(at.side())),
+        unknown: opened.hand.as_ref().err().cloned(),
+        hand: opened.hand.unwrap_or_else(|_| Hand::ideal(at.side())),
         scanning: opened.scanning,
         clock,
         pose: None,
@@ -85,8 +85,8 @@ pub(super) fn run(options: &Watch, interrupt: &Interrupt) -> Result<()> {
 }
 
 struct Watching {
-    /// Somebody knows how the sensors sit.
-    known: bool,
+    /// Why nobody knows how the sensors sit, if nobody does.
+    unknown: Option<String>,
     hand: Hand,
     scanning: Scanning,
     clock: Clock,
@@ -104,7 +104,7 @@ impl Watching {
         let terminal = || "the terminal does not work".to_owned();
         let next = "the same with | cat behind it, which prints lines instead";
         let mut live = Live::start(options.at.json).or_fail(terminal, next)?;
-        if self.known {
+        if self.unknown.is_none() {
             self.lay_flat();
         }
         loop {
@@ -118,7 +118,7 @@ impl Watching {
             for key in live.keys().or_fail(terminal, next)? {
                 match key {
                     Key::End => interrupt.ask(),
-                    Key::Calibrate if self.known => self.lay_flat(),
+                    Key::Calibrate if self.unknown.is_none() => self.lay_flat(),
                     _ => {}
                 }
             }
@@ -182,9 +182,9 @@ impl Watching {
             jitter_us: seen.and_then(|seen| seen.jitter_us),
             baud: seen.map_or(0, |seen| seen.baud),
             faults: self.faults(seen, keys),
-            keys: match (keys, self.known) {
-                (true, true) => "c: the hand lies flat   q: end",
-                (true, false) => "q: end",
+            keys: match (keys, &self.unknown) {
+                (true, None) => "c: the hand lies flat   q: end",
+                (true, Some(_)) => "q: end",
                 (false, _) => "Ctrl-C: end",
             },
         }
@@ -208,6 +208,11 @@ impl Watching {
             let port = self.scanning.port().path().display();
             faults.push(format!("{port} is unplugged, waiting for it to come back"));
         }
+        faults.extend(
+            self.unknown
+                .as_ref()
+                .map(|why| format!("not calibrated: {why}")),
+        );
         match self.hand.flat() {
             Flat::Waiting(why) => {
                 let why = why.as_deref().unwrap_or("fingers together, for a second");

@@ -54,19 +54,20 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.at.json);
     outputs::check_new(&options.out, "a recording")?;
     let clock = Clock::start();
-    let mut opened = options.at.open(&tell, clock, interrupt)?;
-    complete(options, &opened)?;
-    let Some(mut hand) = opened.hand.take() else {
-        opened.scanning.stop()?;
-        return Err(not_calibrated(options).into());
-    };
-    if !take_flat(&mut hand, &mut opened.scanning, clock, &tell, interrupt)? {
+    let Opened {
+        mut scanning,
+        hand,
+        missing,
+    } = options.at.open(&tell, clock, interrupt)?;
+    complete(options, missing)?;
+    let mut hand = hand.map_err(|why| not_calibrated(options, &why))?;
+    if !take_flat(&mut hand, &mut scanning, clock, &tell, interrupt)? {
         return Err(Failure::interrupted("before anything was recorded").into());
     }
     // A full disk is the writer's to tell.
     interrupt.look_after_file_limit();
     let (file, rows) = PosesFile::create(&options.out, interrupt, Some)?;
-    let mut session = Session::new(opened.scanning, hand, rows, options.at.json);
+    let mut session = Session::new(scanning, hand, rows, options.at.json);
     let recorded = match options.seconds {
         Some(time) => session.free(time, interrupt),
         None => session.guided(interrupt),
@@ -181,6 +182,9 @@ fn once_more(options: &Record) -> NextStep {
     if options.at.ideal {
         command = command.word("--ideal");
     }
+    if let Some(profile) = &options.at.profile {
+        command = command.path("--profile", profile);
+    }
     command.into()
 }
 
@@ -202,8 +206,8 @@ fn nothing(options: &Record) -> Failure {
 }
 
 /// Every row needs every sensor.
-fn complete(options: &Record, opened: &Opened) -> Result<()> {
-    if opened.missing == 0 {
+fn complete(options: &Record, missing: usize) -> Result<()> {
+    if missing == 0 {
         return Ok(());
     }
     let what = format!(
@@ -213,14 +217,12 @@ fn complete(options: &Record, opened: &Opened) -> Result<()> {
     Err(Failure::new(what, options.at.doctor()).into())
 }
 
-fn not_calibrated(options: &Record) -> Failure {
+fn not_calibrated(options: &Record, why: &str) -> Failure {
     let place = options.at.glove.display();
     let next = NextStep::same(Command::more().word("--ideal"))
         .then(", for a virtual glove whose sensors sit straight");
     Failure::new(
-        format!(
-            "the glove on {place} is not calibrated: nobody knows how its sensors sit on the hand"
-        ),
+        format!("the glove on {place} is not calibrated: {why}"),
         next,
     )
 }
