@@ -50,6 +50,8 @@ pub struct Devices<C: Chip> {
     pub gripper: C::Line,
     /// Both slots of the weights store.
     pub slots: [C::Flash; 2],
+    /// Both slots of the glove's profile: an erase sector each is enough.
+    pub profile: [C::Flash; 2],
 }
 
 /// Runs the bridge on `board` until a host asks for a restart: the caller's to do then.
@@ -59,8 +61,10 @@ pub fn run<C: Chip>(board: C, devices: Devices<C>) {
         glove,
         gripper,
         slots,
+        profile,
     } = devices;
     let mut app = bridge(board, glove, gripper, slots);
+    app.keep_profile(profile);
     let mut server = Server::new(host);
     app.platform_mut().start_watchdog();
     while turn(&mut app, &mut server) == Outcome::Continue {}

@@ -133,11 +133,11 @@ pub fn hold_clutch(link: &mut HostLink, time: Duration) -> Vec<State> {
 
 /// Calibrates the bridge on the hand as it lies now, as often as it takes: sensors may just be coming up.
 fn calibrate(link: &mut HostLink) {
-    link.calibrate_flat_hand().expect("taken");
+    link.calibrate_straight().expect("taken");
     wait_for(link, "the calibration", |link| {
         let calibration = link.health().expect("an answer").calibration;
         if matches!(calibration.newest, Try::Refused(_)) {
-            link.calibrate_flat_hand().expect("taken");
+            link.calibrate_straight().expect("taken");
         }
         calibration.is_calibrated
     });

@@ -328,7 +328,7 @@ impl<'i> Host<'i> {
         } else if now >= self.calibrate && now < CALIBRATED - CALIBRATE_EVERY {
             // More than once: on a line with faults a request may be lost, and a second with a lost sensor is refused.
             self.calibrate = now + CALIBRATE_EVERY;
-            self.say(line, Call::CalibrateFlatHand);
+            self.say(line, Call::CalibrateStraight);
         } else if now < ACTIVE {
             // A line that is not clean: what is no frame is counted and passed over.
             line.0.borrow_mut().extend([0x55, 0x00, 0x13]);

@@ -34,6 +34,7 @@ impl Teleop {
         let mut child = Command::new(program)
             .args([
                 "teleop",
+                "--ideal",
                 "--calibrate-flat",
                 "--engage",
                 "--seconds",

@@ -131,6 +131,8 @@ pub enum Kind {
 pub enum Request {
     /// Activating the gripper while it follows the hand.
     Activate,
+    /// Another profile.
+    Profile,
 }
 
 impl core::fmt::Display for Kind {
@@ -235,6 +237,9 @@ impl core::fmt::Display for Kind {
             Kind::Refused(Request::Activate) => f.write_str(
                 "not activated while the gripper follows the hand: release the clutch first",
             ),
+            Kind::Refused(Request::Profile) => {
+                f.write_str("the profile stays as it is: release the clutch first")
+            }
         }
     }
 }

@@ -1,11 +1,15 @@
 //! The command line: the verbs, and the help a newcomer reads first. The options of a verb are beside it.
 
+mod preferred;
+
+use std::ffi::OsString;
+
 use anyhow::Result;
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::commands::{
-    bridge, demo, doctor, eval, export, flash, glove, gripper, ports, record, reproduce, simulate,
-    teleop, train,
+    bridge, calibrate, demo, doctor, eval, export, flash, glove, gripper, ports, record, reproduce,
+    settings, simulate, teleop, train,
 };
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
@@ -27,6 +31,7 @@ Start here:
 With hardware:
   gauntlet ports                                 which serial ports are there
   gauntlet doctor --gripper /dev/ttyUSB1 --glove /dev/ttyUSB0
+  gauntlet calibrate --glove /dev/ttyUSB0
   gauntlet record --glove /dev/ttyUSB0 --out my_hand.csv
   gauntlet train --poses my_hand.csv --out model.safetensors
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors --calibrate-flat
@@ -63,6 +68,8 @@ pub enum Verb {
     Bridge(bridge::Bridge),
     /// List the serial ports of this machine.
     Ports(ports::Ports),
+    /// Calibrate a glove on a hand, in a minute: how its sensors sit, which hand it is, how the joints turn.
+    Calibrate(calibrate::Calibrate),
     /// Record a hand from a glove, for `train`: no gripper and no model needed.
     Record(record::Record),
     /// Watch a glove by itself: the hand, the rates, each sensor.
@@ -71,6 +78,8 @@ pub enum Verb {
     Gripper(gripper::Gripper),
     /// Find out which layer fails: port, line, unit, device.
     Doctor(doctor::Doctor),
+    /// Print the settings, which are defaults for every verb, and where they lie.
+    Settings(settings::Settings),
 }
 
 /// What is wrong with a command that a person is told to paste, where it is one of this tool and cannot be typed.
@@ -108,6 +117,8 @@ impl Verb {
             Self::Glove(options) => options.json(),
             Self::Gripper(options) => options.verb.target().json,
             Self::Doctor(options) => options.json,
+            Self::Calibrate(options) => options.json,
+            Self::Settings(options) => options.json,
         }
     }
 }
@@ -117,6 +128,19 @@ impl Cli {
     pub fn json(&self) -> bool {
         self.verb.as_ref().is_some_and(Verb::json)
     }
+}
+
+/// What was typed, with this person's settings as defaults. Ends the process where it is help, or wrong.
+///
+/// # Errors
+/// The settings file is wrong; only for verbs that use it.
+pub fn parse(typed: &[OsString]) -> Result<Cli> {
+    let mut command = Cli::command();
+    if preferred::uses(typed) {
+        command = preferred::with(command, &host::settings::Settings::load()?, typed);
+    }
+    let matches = command.get_matches_from(typed);
+    Ok(Cli::from_arg_matches(&matches).unwrap_or_else(|error| error.exit()))
 }
 
 /// Runs what the command line says.
@@ -149,6 +173,8 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Glove(options) => glove::run(&options, &interrupt()?),
         Verb::Gripper(options) => gripper::run(&options, &interrupt()?),
         Verb::Doctor(options) => doctor::run(&options, &interrupt()?),
+        Verb::Calibrate(options) => calibrate::run(&options, &interrupt()?),
+        Verb::Settings(options) => settings::run(&options),
     }
 }
 
@@ -156,7 +182,6 @@ pub fn run(cli: Cli) -> Result<()> {
 mod tests {
     use super::*;
     use crate::commands::demo::Demo;
-    use clap::CommandFactory;
 
     #[test]
     fn the_command_tree_is_sound() {

@@ -13,6 +13,7 @@
 pub mod cli;
 pub mod commands;
 mod flat_hand;
+mod heard;
 pub mod live;
 pub mod options;
 pub mod out;

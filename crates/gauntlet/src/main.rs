@@ -2,9 +2,7 @@
 
 use std::process::ExitCode;
 
-use clap::Parser;
-use gauntlet::cli::{self, Cli};
-use gauntlet::{note, options, out, results};
+use gauntlet::{cli, note, options, out, results};
 use host::failure;
 
 /// A command in the next step that cannot be typed.
@@ -14,9 +12,12 @@ fn unusable(error: &anyhow::Error) -> Option<String> {
 }
 
 fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let json = cli.json();
-    let done = cli::run(cli).map_err(|error| failure::typed(error, &options::typed()));
+    let typed: Vec<_> = std::env::args_os().collect();
+    let (json, done) = match cli::parse(&typed) {
+        Ok(cli) => (cli.json(), cli::run(cli)),
+        Err(error) => (typed.iter().any(|word| word == "--json"), Err(error)),
+    };
+    let done = done.map_err(|error| failure::typed(error, &options::typed()));
     if let Err(error) = &done
         && json
         && let Err(other) = results::print_failure(error)

@@ -25,6 +25,8 @@ pub enum Kind {
     Log,
     /// A weights image.
     Image,
+    /// A glove's profile, TOML.
+    Profile,
 }
 
 impl Kind {
@@ -34,6 +36,7 @@ impl Kind {
             Self::Checkpoint => "a checkpoint",
             Self::Log => "an MCAP file",
             Self::Image => "a weights image",
+            Self::Profile => "a glove's profile",
         }
     }
 
@@ -45,6 +48,7 @@ impl Kind {
             Self::Checkpoint => is_safetensors(start, length) && !names(start, MODEL),
             Self::Log => start.starts_with(b"\x89MCAP0\r\n"),
             Self::Image => start.starts_with(&hae::image::MAGIC),
+            Self::Profile => start.starts_with(PROFILE),
         }
     }
 }
@@ -79,6 +83,8 @@ fn place_of_file(path: &Path) -> Result<()> {
 /// What the header of a checkpoint names, and that of a model.
 const CHECKPOINT: &[u8] = b"\"settings_sha256\"";
 const MODEL: &[u8] = b"\"f.w1\"";
+/// How a profile begins.
+const PROFILE: &[u8] = b"# A glove on a hand,";
 /// The headers of both are shorter.
 const HEADER: u64 = 64 << 10;
 /// The room that a model, a checkpoint or an image may need.

@@ -12,6 +12,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::event::Kind;
+use glove::calibration::Bound;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::live::{Key, Live};
@@ -106,6 +107,8 @@ pub struct Run {
     ending: Option<Ending>,
     /// The gripper was told to activate.
     activated: bool,
+    /// The glove's sensors sit straight and share a heading; else a profile says how they sit.
+    straight: bool,
 }
 
 impl Run {
@@ -133,6 +136,7 @@ impl Run {
             file_limit: None,
             ending: None,
             activated: false,
+            straight: true,
         }
     }
 
@@ -331,6 +335,7 @@ impl Run {
     fn obey(&mut self, key: Key, options: &Options) {
         match key {
             Key::End => self.interrupt.ask(),
+            Key::Again => {}
             _ if !options.drives => {}
             Key::Clutch => {
                 if self.clutch.closed {
@@ -342,9 +347,22 @@ impl Run {
             Key::Open => self.release(),
             // One that is not taken says no word of having begun; who pressed it presses it again.
             Key::Calibrate => {
-                self.session
-                    .order(Order::Calibrate(glove::timing::STILL_WAIT));
+                self.session.order(self.flat(glove::timing::STILL_WAIT));
             }
+        }
+    }
+
+    /// The glove's sensors do not sit straight: by `profile` they sit, if there is one.
+    pub fn wears(&mut self, profile: Option<Bound>) {
+        self.straight = false;
+        self.session.set_profile(profile);
+    }
+
+    /// The order to take the flat hand within `wait`.
+    fn flat(&self, wait: bridge::Duration) -> Order {
+        match self.straight {
+            true => Order::CalibrateStraight(wait),
+            false => Order::FlatPose(wait),
         }
     }
 

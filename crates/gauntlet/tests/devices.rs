@@ -63,6 +63,7 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
         &simulation.glove(),
         &simulation.gripper(),
         &[
+            "--ideal",
             "--calibrate-flat",
             "--engage",
             "--activate",
@@ -108,7 +109,7 @@ fn engaging_a_gripper_that_is_not_activated_is_refused_with_the_way_out() {
     let output = run_owned(&teleop(
         &simulation.glove(),
         &simulation.gripper(),
-        &["--calibrate-flat", "--engage", "--seconds", "2"],
+        &["--ideal", "--calibrate-flat", "--engage", "--seconds", "2"],
     ));
     assert!(refusal(&output, 1).contains("not activated"));
     assert!(text(&output.stderr).contains("--activate"));
@@ -120,7 +121,14 @@ fn driving(simulation: &Simulation, word: &str, log: &str) -> (Child, JoinHandle
     let arguments = teleop(
         &simulation.glove(),
         &simulation.gripper(),
-        &["--calibrate-flat", "--engage", "--activate", "--log", log],
+        &[
+            "--ideal",
+            "--calibrate-flat",
+            "--engage",
+            "--activate",
+            "--log",
+            log,
+        ],
     );
     let mut child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
         .stdout(Stdio::piped())

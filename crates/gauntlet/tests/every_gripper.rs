@@ -71,6 +71,7 @@ fn ran(gripper: &VirtualGripper, place: &str, options: &[&str]) -> Output {
     let (_port, glove_place) = devices::behind_pty(glove);
     let words = ["teleop", "--glove", &glove_place, "--gripper", place];
     let more = [
+        "--ideal",
         "--calibrate-flat",
         "--engage",
         "--activate",

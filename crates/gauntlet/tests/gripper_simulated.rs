@@ -71,6 +71,7 @@ fn teleop(simulation: &Simulation, more: &[&str]) -> Vec<String> {
         model().to_str().unwrap(),
         "--engage",
         "--activate",
+        "--ideal",
         "--calibrate-flat",
     ];
     fixed

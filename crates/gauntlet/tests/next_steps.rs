@@ -39,7 +39,7 @@ fn typed_at(devices: &Devices) -> Vec<Vec<String>> {
     let lines: &[&str] = match devices {
         Devices::Here { .. } => &[
             "teleop --glove g --gripper h --model m",
-            "teleop --glove g --gripper h --model m --calibrate-flat --engage --activate --seconds 9",
+            "teleop --glove g --gripper h --model m --ideal --calibrate-flat --engage --activate --seconds 9",
         ],
         Devices::Chip(_) => &[
             "bridge engage --bridge unix:b",

@@ -294,6 +294,7 @@ fn the_first_command_after_a_stall_is_where_the_gripper_is() {
         "--model",
         model,
         "--engage",
+        "--ideal",
         "--calibrate-flat",
         "--seconds",
         "120",

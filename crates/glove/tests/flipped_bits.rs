@@ -1,6 +1,7 @@
 //! What the norm and the jump check cannot see: bits flipped inside a quaternion. The figures stand in docs/safety.md.
 
 use glove::hand::Quaternion;
+use glove::imu::repair::repaired;
 use glove::imu::{angle_between, is_reachable, orientation};
 use glove::timing;
 
@@ -50,7 +51,7 @@ struct Tally {
 impl Tally {
     fn take(&mut self, before: &Quaternion, flipped: &[u8; 8]) {
         self.flips += 1;
-        let Ok(after) = orientation(flipped) else {
+        let Ok(after) = orientation(&repaired(*flipped).0) else {
             return;
         };
         self.norm_kept += 1;

@@ -26,11 +26,14 @@ fn main() -> anyhow::Result<()> {
         line: Settings::default(),
         image: std::fs::read(image)?,
         side: glove::hand::Side::Right,
+        profile: None,
         feed: None,
     };
     let mut session = InProcess::start(parts, clock, &interrupt)?;
     // The hand lies flat, fingers together, until it has been still for a second.
-    session.order(Order::Calibrate(bridge::Duration::from_millis(30_000)));
+    session.order(Order::CalibrateStraight(bridge::Duration::from_millis(
+        30_000,
+    )));
     let flat = |seen: host::session::Snapshot| seen.calibration.is_calibrated;
     while !session.snapshot().is_some_and(flat) && session.running() && !interrupt.sleep(BEAT) {}
     session.order(Order::Engage);

@@ -11,6 +11,6 @@ pub mod report;
 pub mod virtual_person;
 
 pub use guide::{Guide, Judged};
-pub use profile_file::{Found, Kept, ProfileStore};
+pub use profile_file::{Found, Kept, ProfileStore, profile_of};
 pub use recorded::Recorded;
 pub use replay::{Replay, replay};

@@ -1,4 +1,4 @@
-//! The weights flash: the board's 16 MB PSRAM, which QEMU keeps in a file, behind the behaviour of a NOR flash.
+//! The flash of weights and profile: the board's 16 MB PSRAM, which QEMU keeps in a file, behind the behaviour of a NOR flash.
 //!
 //! Erasing makes a sector all ones; programming only clears bits, a word at a time. A word that would need a bit set is
 //! refused: a real chip would silently keep the bit clear.
@@ -15,7 +15,7 @@ pub const SECTOR_BYTES: usize = 4096;
 /// Bytes of a program unit.
 pub const WORD_BYTES: usize = 4;
 
-/// One of the two slots of the weights store.
+/// One of the slots of the weights or of the profile.
 pub struct PsramSlot {
     base: usize,
 }
@@ -41,20 +41,25 @@ impl NorFlashError for FlashError {
     }
 }
 
-/// The two slots. A file fresh from QEMU reads all zero, which no flash does: such a slot is made blank.
+/// The two slots of the weights.
 pub(super) fn slots() -> [PsramSlot; 2] {
-    let mut slots = [
-        PsramSlot { base: PSRAM },
-        PsramSlot {
-            base: PSRAM + SLOT_BYTES,
-        },
-    ];
-    for slot in &mut slots {
-        if slot.bytes().iter().all(|&byte| byte == 0) {
-            slot.fill_ones(0, SLOT_BYTES);
-        }
+    [slot(0), slot(1)]
+}
+
+/// The two slots of the glove's profile.
+pub(super) fn profile_slots() -> [PsramSlot; 2] {
+    [slot(2), slot(3)]
+}
+
+/// A file fresh from QEMU reads all zero, which no flash does: such a slot is made blank.
+fn slot(number: usize) -> PsramSlot {
+    let mut slot = PsramSlot {
+        base: PSRAM + number * SLOT_BYTES,
+    };
+    if slot.bytes().iter().all(|&byte| byte == 0) {
+        slot.fill_ones(0, SLOT_BYTES);
     }
-    slots
+    slot
 }
 
 impl PsramSlot {

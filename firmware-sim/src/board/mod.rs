@@ -42,6 +42,7 @@ pub fn take() -> Option<(Mps2, Devices<Mps2>)> {
         glove: Port::open(Uart::Glove)?,
         gripper: Port::open(Uart::Gripper)?,
         slots: flash::slots(),
+        profile: flash::profile_slots(),
     };
     interrupts::enable();
     let board = Mps2 {

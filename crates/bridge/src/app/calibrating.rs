@@ -4,7 +4,7 @@
 use super::App;
 use crate::board::Board;
 use crate::calibration::{Refusal, Try};
-use crate::event::Kind;
+use crate::event::{Kind, Request};
 use crate::posture::Basis;
 use crate::{Duration, Instant};
 use glove::calibration::Bound;
@@ -46,12 +46,13 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     /// Takes the glove's profile, or none. Nothing is calibrated then before a flat pose, and nothing can be taken back.
     ///
     /// # Errors
-    /// [`Refusal::Engaged`] while the clutch is closed: nothing changes then.
+    /// [`Refusal::Engaged`], with an event, while the clutch is closed: nothing changes then.
     pub fn set_profile(&mut self, profile: Option<&Bound>) -> Result<(), Refusal> {
+        let now = self.board.now();
         if self.is_engaged() {
+            self.tell(now, Kind::Refused(Request::Profile));
             return Err(Refusal::Engaged);
         }
-        let now = self.board.now();
         self.calibrating = Calibrating::default();
         self.posture.set_profile(profile);
         self.sensors.starts = None;

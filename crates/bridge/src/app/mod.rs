@@ -19,7 +19,7 @@ use crate::clutch::{Clutch, Epoch, HeartbeatRefusal, Position};
 use crate::config::Config;
 use crate::event::{self, Event, Kind, Request};
 use crate::posture::Posture;
-use crate::store::{Expected, WeightsStore};
+use crate::store::{Expected, WeightsStore, profile::ProfileStore};
 use crate::supervisor::{Hand, State, Supervisor};
 use crate::telemetry::{Sent, Telemetry};
 use crate::{HIDDEN, Instant};
@@ -49,6 +49,7 @@ pub struct App<B: Board<X>, const X: usize> {
     scanner: Scanner<B::Glove>,
     gripper: B::Gripper,
     store: WeightsStore<B::Flash>,
+    profiles: Option<ProfileStore<B::Flash>>,
     supervisor: Supervisor<X>,
     posture: Posture,
     hand: Option<Hand<X>>,
@@ -121,6 +122,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             scanner,
             gripper,
             store,
+            profiles: None,
             supervisor: Supervisor::new(config),
             posture: Posture::new(config.settings().side, None),
             hand: None,

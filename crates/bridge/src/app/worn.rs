@@ -5,11 +5,36 @@ use crate::Instant;
 use crate::board::Board;
 use crate::calibration::ProfileState;
 use crate::event::Kind;
+use crate::store::profile::ProfileStore;
 use glove::calibration::Misfit;
 use glove::hand::SEGMENT_COUNT;
 use glove::headings::PoseReport;
 
 impl<B: Board<X>, const X: usize> App<B, X> {
+    /// Keeps the profile in these slots from now on, and takes the one that is there.
+    pub fn keep_profile(&mut self, slots: [B::Flash; 2]) {
+        self.profiles = Some(ProfileStore::new(slots));
+        self.use_kept_profile();
+    }
+
+    /// Where the profile is kept, if it is.
+    pub fn profiles_mut(&mut self) -> Option<&mut ProfileStore<B::Flash>> {
+        self.profiles.as_mut()
+    }
+
+    /// Takes the profile that is kept, or none where none is. Nothing changes while the clutch is closed.
+    #[inline(never)]
+    pub(crate) fn use_kept_profile(&mut self) {
+        let kept = self.profiles.as_ref().and_then(ProfileStore::profile);
+        // Refused only while the clutch is closed, which callers have looked at.
+        let _ = self.set_profile(kept.as_ref());
+    }
+
+    /// The sensor on each segment, as it is wired.
+    pub fn seats(&self) -> [u8; SEGMENT_COUNT] {
+        self.posture.seats()
+    }
+
     /// Sensors that have started since the last frame: their ids are known then, and their headings are others.
     pub(super) fn watch_starts(&mut self, now: Instant) {
         let starts = self.scanner.counters().starts;

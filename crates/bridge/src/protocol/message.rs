@@ -17,10 +17,12 @@ use serde::{Deserialize, Serialize};
 mod counters;
 mod devices;
 mod health;
+mod worn;
 
 pub use counters::Counters;
 pub use devices::{AxisDetail, CAUSES, Devices, GripperDetail, Replies, UnusedSensor};
 pub use health::{Health, Restart};
+pub use worn::{Headings, PROFILE_CHUNK, ProfilePart, STAMP_US, Scan, SensorIds};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.
 pub const VERSION: u16 = 3;
@@ -96,8 +98,8 @@ pub enum Call<'a> {
     Release,
     /// Activates the gripper: **it moves**. Answer: [`Answer::Done`].
     Activate,
-    /// Takes the hand, flat and still for a second, as all joints at zero; [`Call::Health`] tells how it ended. Answer:
-    /// [`Answer::Done`].
+    /// Takes the headings of the profile's sensors from the hand, flat and still for a second; [`Call::Health`] tells how it ended.
+    /// Answer: [`Answer::Done`].
     CalibrateFlatHand,
     /// [`FromBridge::Sample`] every so often from now on. Answer: [`Answer::Done`].
     Telemetry {
@@ -118,6 +120,47 @@ pub enum Call<'a> {
     /// Sensors and axes one by one, the gripper's line. A bridge from before this call says nothing to it. Answer:
     /// [`Answer::Devices`].
     Devices,
+    /// Takes the hand, flat and still for a second, as all joints at zero, for sensors that sit straight and share a heading: virtual
+    /// ones. [`Call::Health`] tells how it ended. Answer: [`Answer::Done`].
+    CalibrateStraight,
+    /// Bytes of the glove's profile ([`glove::calibration::Bound::to_bytes`]), one after the other from 0 on; what came before may come
+    /// again. Refused while the clutch is closed. Answer: [`Answer::Received`].
+    ProfileChunk {
+        /// Where they begin.
+        offset: u32,
+        /// At most [`CHUNK`] bytes.
+        bytes: &'a [u8],
+    },
+    /// Checks the profile that came, keeps it over restarts and makes it the one in use: the glove is then not calibrated before a
+    /// flat pose. Refused while the clutch is closed. Answer: [`Answer::Done`].
+    ProfileCommit {
+        /// Bytes of the profile.
+        length: u32,
+        /// CRC-32/ISO-HDLC of them.
+        crc: u32,
+    },
+    /// Takes the profile away, for good. Refused while the clutch is closed. Answer: [`Answer::Done`].
+    ProfileErase,
+    /// Bytes of the profile that is kept. Answer: [`Answer::Profile`].
+    ProfileGet {
+        /// From where on.
+        offset: u32,
+    },
+    /// [`FromBridge::Scan`] for each scan from now on, as far as the line has room. Answer: [`Answer::Done`].
+    Scans {
+        /// Whether they come.
+        on: bool,
+    },
+    /// Who the sensors are. Answer: [`Answer::SensorIds`].
+    SensorIds,
+    /// How sure the headings are, and what the newest flat pose showed. Answer: [`Answer::Headings`].
+    Headings,
+    /// Whether flat poses are found while the hand works; they are until somebody says no, or the bridge restarts. Answer:
+    /// [`Answer::Done`].
+    FindFlat {
+        /// Whether they are.
+        on: bool,
+    },
 }
 
 /// From the bridge.
@@ -127,6 +170,8 @@ pub enum FromBridge {
     Reply(Reply),
     /// What is now, unasked, while telemetry is on.
     Sample(Sample),
+    /// A scan of the glove, unasked, while scans are on.
+    Scan(Scan),
 }
 
 /// The answer to a request.
@@ -171,6 +216,12 @@ pub enum Answer {
     Health(Health),
     /// To devices.
     Devices(Devices),
+    /// To profile get.
+    Profile(ProfilePart),
+    /// To sensor ids.
+    SensorIds(SensorIds),
+    /// To headings.
+    Headings(Headings),
 }
 
 /// What the bridge is.
@@ -368,6 +419,8 @@ pub enum Refusal {
     },
     /// A heartbeat that keeps nothing closed.
     Heartbeat(#[serde(with = "wire::WireHeartbeatRefusal")] HeartbeatRefusal),
+    /// The profile was not taken, or there is none.
+    Profile(#[serde(with = "wire::WireProfileError")] store::profile::Error),
 }
 
 /// The names that [`Refusal::Configuration`] counts through.

@@ -8,6 +8,7 @@ pub mod frame;
 mod incoming;
 pub mod message;
 mod outgoing;
+mod profiles;
 mod server;
 mod slow;
 mod telling;

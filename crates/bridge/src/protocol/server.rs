@@ -4,11 +4,12 @@ use super::configuration::{self};
 use super::frame::{Decoder, MAX_MESSAGE};
 use super::message::{
     Answer, CHUNK, Call, Configuration, FromBridge, Hello, Refusal, Reply, Request, Restart,
-    VERSION,
+    SensorIds, VERSION,
 };
 use super::outgoing::Outgoing;
+use super::profiles::{change_profile, profile_chunk, profile_part};
 use super::slow::{Reading, Slow};
-use super::telling::{devices, status};
+use super::telling::{devices, headings, status};
 use crate::store::WeightsStore;
 use crate::{App, Board, Config, Duration, Instant, Slot, timing};
 use embedded_io::{Read, ReadReady, Write};
@@ -46,6 +47,8 @@ pub struct Server<S> {
     pub(super) malformed: u32,
     pub(super) session: Option<Session>,
     pub(super) telemetry: Option<Telemetry>,
+    /// Scans are sent; the frame that was the newest when one was looked for last.
+    pub(super) scans: Option<u32>,
     /// CRC announced for the image under way, and by it the same image is known again.
     announced_crc: u32,
     pub(super) reply: Outgoing,
@@ -88,6 +91,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
             malformed: 0,
             session: None,
             telemetry: None,
+            scans: None,
             announced_crc: 0,
             reply: Outgoing::EMPTY,
             answered: None,
@@ -150,6 +154,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         }
         if !self.reply.is_busy() {
             self.take_sample(now, app);
+            self.take_scan(app);
         }
         self.send();
         Outcome::Continue
@@ -204,7 +209,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         if let Some(own) = &mut self.session {
             own.heard = now;
         }
-        match slow.step(app.store_mut()) {
+        match slow.step(app) {
             None => self.slow = Some((slow, session, sequence)),
             Some(answer) => self.reply(session, sequence, answer),
         }
@@ -237,6 +242,12 @@ impl<S: Read + ReadReady + Write> Server<S> {
         let slow = match &request.call {
             Call::Slots => Slow::Read(Reading::new()),
             Call::WeightsCommit => Slow::Commit,
+            Call::ProfileCommit { .. } | Call::ProfileErase => {
+                match change_profile(&request.call, app) {
+                    Ok(()) => Slow::Profile,
+                    Err(refusal) => return Some(Err(refusal)),
+                }
+            }
             Call::SelectSlot { slot } => match app.store_mut().select(usize::from(*slot)) {
                 Ok(()) => Slow::Read(Reading::new()),
                 Err(error) => return Some(Err(Refusal::Store(error))),
@@ -281,6 +292,21 @@ impl<S: Read + ReadReady + Write> Server<S> {
             Call::CalibrateFlatHand => idle(app)
                 .map(|app| app.calibrate_flat_hand())
                 .map(|()| Answer::Done),
+            Call::CalibrateStraight => idle(app)
+                .map(|app| app.calibrate_straight())
+                .map(|()| Answer::Done),
+            Call::ProfileChunk { offset, bytes } => profile_chunk(*offset, bytes, app),
+            Call::ProfileGet { offset } => profile_part(*offset, app),
+            Call::Scans { on } => {
+                self.scans = on.then_some(app.telemetry().frame_sequence);
+                Ok(Answer::Done)
+            }
+            Call::SensorIds => Ok(Answer::SensorIds(SensorIds(app.scanner_mut().ids()))),
+            Call::Headings => Ok(Answer::Headings(headings(app))),
+            Call::FindFlat { on } => {
+                app.set_finds_flat(*on);
+                Ok(Answer::Done)
+            }
             Call::CalibrateUndo => idle(app)
                 .map(|app| app.undo_calibration())
                 .map(|()| Answer::Done),
@@ -298,6 +324,8 @@ impl<S: Read + ReadReady + Write> Server<S> {
             | Call::Hello { .. }
             | Call::Slots
             | Call::WeightsCommit
+            | Call::ProfileCommit { .. }
+            | Call::ProfileErase
             | Call::SelectSlot { .. } => Ok(Answer::Status(status(app))),
         }
     }
@@ -325,7 +353,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
             newest: request.sequence,
             heard: now,
         });
-        self.telemetry = None;
+        (self.telemetry, self.scans) = (None, None);
         let expected = app.store().expected();
         let [inputs, hidden, outputs] = expected.shape;
         Ok(Answer::Hello(Hello {
@@ -345,7 +373,7 @@ impl<S: Read + ReadReady + Write> Server<S> {
         });
         if silent {
             self.session = None;
-            self.telemetry = None;
+            (self.telemetry, self.scans) = (None, None);
         }
     }
 
@@ -384,7 +412,9 @@ impl<S: Read + ReadReady + Write> Server<S> {
 }
 
 /// The app, if its clutch is open.
-fn idle<B: Board<X>, const X: usize>(app: &mut App<B, X>) -> Result<&mut App<B, X>, Refusal> {
+pub(super) fn idle<B: Board<X>, const X: usize>(
+    app: &mut App<B, X>,
+) -> Result<&mut App<B, X>, Refusal> {
     if app.is_engaged() {
         Err(Refusal::Engaged)
     } else {

@@ -1,9 +1,10 @@
-//! Requests that look at whole images: done in pieces, one a poll, so that the loop's step stays short.
+//! Requests that look at whole images, or write the profile: done in pieces, one a poll, so that the loop's step stays short.
 
 use super::frame::CRC32;
 use super::message::{Answer, Refusal, SlotContents, Slots};
 use crate::board::Slot;
-use crate::store::{Contents, WeightsStore};
+use crate::store::{Contents, WeightsStore, profile};
+use crate::{App, Board};
 use crc::{Digest, Table};
 
 /// Bytes of flash that one piece takes through the CRC.
@@ -16,16 +17,18 @@ pub(super) enum Slow {
     Commit,
     /// Read both slots.
     Read(Reading),
+    /// Write the profile, or take it away; then the bridge uses what is kept.
+    Profile,
 }
 
 impl Slow {
     /// The next piece: `Some` at the end.
-    pub(super) fn step<F: Slot>(
+    pub(super) fn step<B: Board<X>, const X: usize>(
         &mut self,
-        store: &mut WeightsStore<F>,
+        app: &mut App<B, X>,
     ) -> Option<Result<Answer, Refusal>> {
         match self {
-            Self::Commit => match store.commit_step() {
+            Self::Commit => match app.store_mut().commit_step() {
                 Ok(false) => None,
                 Ok(true) => {
                     *self = Self::Read(Reading::new());
@@ -33,8 +36,34 @@ impl Slow {
                 }
                 Err(error) => Some(Err(Refusal::Store(error))),
             },
-            Self::Read(reading) => reading.step(store).map(|slots| Ok(Answer::Slots(slots))),
+            Self::Read(reading) => reading
+                .step(app.store())
+                .map(|slots| Ok(Answer::Slots(slots))),
+            Self::Profile => profile_step(app),
         }
+    }
+}
+
+/// The next piece of a profile's way into the flash, or out of it.
+fn profile_step<B: Board<X>, const X: usize>(
+    app: &mut App<B, X>,
+) -> Option<Result<Answer, Refusal>> {
+    let is_engaged = app.is_engaged();
+    let Some(profiles) = app.profiles_mut() else {
+        return Some(Err(Refusal::Profile(profile::Error::NoStore)));
+    };
+    if is_engaged {
+        // Closed since it was begun: what is kept is as it was.
+        profiles.abort();
+        return Some(Err(Refusal::Engaged));
+    }
+    match profiles.step() {
+        Ok(false) => None,
+        Ok(true) => {
+            app.use_kept_profile();
+            Some(Ok(Answer::Done))
+        }
+        Err(error) => Some(Err(Refusal::Profile(error))),
     }
 }
 

@@ -2,14 +2,27 @@
 
 use super::configuration::per_axis;
 use super::message::{
-    AXES, AxisDetail, CAUSES, Counters, Devices, FromBridge, GripperDetail, GripperStatus, Health,
-    Replies, Sample, Status, UnusedSensor,
+    AXES, AxisDetail, CAUSES, Counters, Devices, FromBridge, GripperDetail, GripperStatus,
+    Headings, Health, Replies, Sample, Scan, Status, UnusedSensor,
 };
 use super::server::Server;
 use crate::clutch::Position;
 use crate::{App, Board, Instant};
 
 impl<S> Server<S> {
+    /// The newest scan, if it was not sent yet and the line is free: one that is newer when it is goes instead.
+    pub(super) fn take_scan<B: Board<X>, const X: usize>(&mut self, app: &App<B, X>) {
+        let seen = app.telemetry();
+        let (Some(sent), Some(frame)) = (self.scans, &seen.frame) else {
+            return;
+        };
+        if sent != seen.frame_sequence && !self.sample.is_busy() {
+            self.scans = Some(seen.frame_sequence);
+            let scan = Scan::new(frame, &app.seats(), &seen.counters.glove.starts);
+            self.sample.set(&FromBridge::Scan(scan));
+        }
+    }
+
     pub(super) fn take_sample<B: Board<X>, const X: usize>(
         &mut self,
         now: Instant,
@@ -18,7 +31,8 @@ impl<S> Server<S> {
         let Some(telemetry) = &mut self.telemetry else {
             return;
         };
-        if now < telemetry.due {
+        // A frame that was begun ends first.
+        if now < telemetry.due || self.sample.is_begun() {
             return;
         }
         telemetry.due = now.checked_add_duration(telemetry.period).unwrap_or(now);
@@ -104,6 +118,22 @@ pub(super) fn status<B: Board<X>, const X: usize>(app: &App<B, X>) -> Status {
             .store()
             .progress()
             .map(|(there, announced)| (there as u32, announced as u32)),
+    }
+}
+
+/// How sure its headings are. Out of line, as [`devices`].
+#[inline(never)]
+pub(super) fn headings<B: Board<X>, const X: usize>(app: &App<B, X>) -> Headings {
+    let seen = app.telemetry();
+    Headings {
+        profile: seen.profile,
+        sigma: seen.sigma,
+        drift: seen.drift,
+        degraded: seen.degraded,
+        unknown: seen.unknown,
+        held: seen.held_joints,
+        poses: seen.poses,
+        pose: seen.pose,
     }
 }
 

@@ -16,6 +16,7 @@
 //! Program unit: [`PAGE`] bytes at most, a multiple of the flash's own unit, each programmed once per erase.
 
 mod error;
+pub mod profile;
 mod record;
 mod slot;
 mod writing;

@@ -19,7 +19,7 @@ pub(super) const LEN: usize = 32;
 const MAGIC: [u8; 4] = *b"GREC";
 const CRC_AT: usize = 28;
 
-static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+pub(super) static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// What a record says.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,7 @@
 //! The verbs, one module each with its options. None knows of the command line as a whole.
 
 pub mod bridge;
+pub mod calibrate;
 pub mod demo;
 pub mod doctor;
 pub mod eval;
@@ -11,6 +12,7 @@ pub mod gripper;
 pub mod ports;
 pub mod record;
 pub mod reproduce;
+pub mod settings;
 pub mod simulate;
 pub mod teleop;
 pub mod train;

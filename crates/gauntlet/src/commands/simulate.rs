@@ -8,12 +8,14 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::Args;
 use rig::Device;
-use rig::glove::VirtualGlove;
+use rig::glove::{Honest, VirtualGlove};
 use rig::gripper::tcp::TcpHandle;
 use rig::gripper::{Family, VirtualGripper};
+use rig::person::Traits;
 use rig::pty::{Handle, PtyDevice};
 
 use crate::flat_hand::Hand;
+use crate::heard::Ear;
 use crate::options::model_parser;
 use crate::played;
 use crate::progress::Person;
@@ -27,8 +29,8 @@ use host::probe;
 use host::realtime;
 use host::training::motion::Motion;
 
-/// How often the wait for Ctrl-C looks for a line on standard input.
-const WATCH: Duration = Duration::from_millis(100);
+/// How often the wait for Ctrl-C looks for a line on standard input, and for what the virtual person is asked.
+const WATCH: Duration = Duration::from_millis(50);
 /// How often the sensors are looked at while they boot (650 ms).
 const LOOK: Duration = Duration::from_millis(20);
 /// Where the devices are linked when no path is given.
@@ -43,6 +45,8 @@ Examples:
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
+  gauntlet simulate --honest 7                                       sensors as they really are; in another terminal:
+  gauntlet calibrate --glove /tmp/glove
   gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
@@ -50,6 +54,8 @@ ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT li
 takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
 The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
 Enter lays it flat at any time, and Enter again lets it move. \
+With --honest its sensors are as real ones: sewn on any way, each with a heading of its own that drifts, noise, flipped bits. \
+Its person does by itself what `gauntlet calibrate --glove PATH` asks for. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -67,6 +73,24 @@ pub struct Simulate {
     /// Seed of the generated motion.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
+    /// A virtual person with sensors as they really are, from this seed, instead of a hand whose sensors sit straight.
+    #[arg(long, value_name = "SEED", conflicts_with = "poses")]
+    pub honest: Option<u64>,
+    /// The virtual person's glove is a left one.
+    #[arg(long, requires = "honest")]
+    pub left: bool,
+    /// Two sensors of it, as they are wired, are swapped: 8,11.
+    #[arg(long, value_name = "A,B", requires = "honest", value_parser = swapped)]
+    pub swap: Option<(usize, usize)>,
+}
+
+/// Two different sensors.
+fn swapped(text: &str) -> Result<(usize, usize), String> {
+    let pair = text
+        .split_once(',')
+        .and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+    pair.filter(|(a, b): &(usize, usize)| a != b && *a < 16 && *b < 16)
+        .ok_or_else(|| format!("{text} is not two sensors from 0 to 15, like 8,11"))
 }
 
 /// Runs until interrupted.
@@ -78,11 +102,16 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
     let motion = Motion::open(options.poses.as_deref(), options.seed, &Person)?;
     let glove = glove_place
-        .map(|path| Glove::start(&motion, path))
+        .map(|path| Glove::start(&motion, options, path))
         .transpose()?;
     if let Some(glove) = &glove {
         let place = glove.handle.path().display();
-        say!("glove    {place}  {BAUD} baud, {}", motion.describe());
+        match options.honest {
+            Some(seed) => say!(
+                "glove    {place}  {BAUD} baud, honest sensors and a virtual person (seed {seed})"
+            ),
+            None => say!("glove    {place}  {BAUD} baud, {}", motion.describe()),
+        }
     }
     let gripper = gripper_place
         .map(|place| Simulated::start(place, model))
@@ -106,6 +135,9 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     while !interrupt.sleep(WATCH) {
         if let Some(hand) = &mut hand {
             hand.listen();
+        }
+        if let Some(ear) = glove.as_ref().and_then(|glove| glove.ear.as_ref()) {
+            ear.listen();
         }
     }
     // Taking the handles down removes the links.
@@ -132,15 +164,27 @@ fn places(options: &Simulate) -> Result<[Option<&Path>; 2]> {
 struct Glove {
     device: VirtualGlove,
     handle: Handle,
+    /// Of the virtual person.
+    ear: Option<Ear>,
 }
 
 impl Glove {
     /// Makes one that `link` leads to.
-    fn start(motion: &Motion, link: &Path) -> Result<Self> {
-        let config = rig::glove::Config::at_baud(BAUD);
-        let device = VirtualGlove::new(played::virtual_hand(motion), config);
+    fn start(motion: &Motion, options: &Simulate, link: &Path) -> Result<Self> {
+        let device = match options.honest {
+            Some(seed) => honest(seed, options),
+            None => {
+                let config = rig::glove::Config::at_baud(BAUD);
+                VirtualGlove::new(played::virtual_hand(motion), config)
+            }
+        };
         let handle = spawn(Box::new(device.clone()), link)?;
-        Ok(Self { device, handle })
+        let ear = options.honest.map(|_| Ear::of(&device, link)).transpose()?;
+        Ok(Self {
+            device,
+            handle,
+            ear,
+        })
     }
 
     /// Waits until its sensors have booted, and asks its serial multiplexer.
@@ -148,6 +192,32 @@ impl Glove {
         while !self.device.booted(self.handle.clock().now()) && !interrupt.sleep(LOOK) {}
         probe::open_glove(self.handle.path(), interrupt).map(drop)
     }
+}
+
+/// A glove as it really is, on a virtual person.
+fn honest(seed: u64, options: &Simulate) -> VirtualGlove {
+    let mut honest = Honest {
+        seed,
+        ..Honest::default()
+    };
+    if let Some((a, b)) = options.swap {
+        honest.seats.swap(a, b);
+    }
+    let config = rig::glove::Config {
+        side: if options.left {
+            rig::glove::Side::Left
+        } else {
+            rig::glove::Side::Right
+        },
+        honest: Some(honest),
+        ..rig::glove::Config::at_baud(BAUD)
+    };
+    let person = rig::person::Person::new(Traits {
+        seed,
+        is_left: options.left,
+        ..Traits::default()
+    });
+    VirtualGlove::new(Box::new(person), config)
 }
 
 /// A virtual gripper and the way to it.
@@ -235,6 +305,9 @@ mod tests {
             gripper_model: None,
             poses: None,
             seed: 1,
+            honest: None,
+            left: false,
+            swap: None,
         }
     }
 

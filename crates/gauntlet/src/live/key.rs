@@ -11,4 +11,6 @@ pub enum Key {
     Open,
     /// `c`: the hand is flat now, calibrate on it.
     Calibrate,
+    /// `r`: what is asked for once more.
+    Again,
 }

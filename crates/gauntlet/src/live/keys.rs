@@ -128,6 +128,11 @@ impl Keyboard {
             [b' '] if text => vec![Key::Open],
             [b' '] => vec![Key::Clutch],
             [b'c'] if !text => vec![Key::Calibrate],
+            [b'r'] if !text => {
+                // Where it is no key it is text.
+                self.text = Some(now + TEXT);
+                vec![Key::Again]
+            }
             // A key that was held down, or pressed while this program was not looking.
             keys if keys.iter().all(|byte| *byte == b' ') => vec![Key::Open],
             keys if keys.iter().all(|byte| ends(byte) || b" c".contains(byte))
@@ -171,6 +176,7 @@ mod tests {
         for (bytes, key) in [
             (&b" "[..], Key::Clutch),
             (b"c", Key::Calibrate),
+            (b"r", Key::Again),
             (b"q", Key::End),
             (b"\x1b", Key::End),
             (b"\x03", Key::End),

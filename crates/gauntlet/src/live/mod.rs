@@ -4,9 +4,11 @@
 mod bars;
 mod draw;
 pub mod glove;
+pub mod guided;
 mod key;
 mod keys;
 mod parts;
+mod postures;
 mod raw;
 mod small;
 mod view;

@@ -4,11 +4,13 @@
 //! Times end in `_s`, `_ms` or `_us`, currents in `_ma`. What cannot be told is `null`; a number that is none is a word
 //! ("NaN").
 
+pub mod calibrations;
 pub mod devices;
 pub mod gloves;
 pub mod maps;
 pub mod paper;
 pub mod runs;
+pub mod settings;
 
 use std::sync::atomic::{AtomicBool, Ordering};
 

@@ -37,7 +37,7 @@ impl Run {
         };
         let before = ended(self);
         let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
-        self.order(Order::Calibrate(wait))?;
+        self.order(self.flat(wait))?;
         tell.say(format_args!("{ASK}"));
         let end = Instant::now() + WAIT + ANSWER_WAIT;
         while Instant::now() < end {

@@ -208,6 +208,8 @@ pub(super) enum Hands {
     Keys,
     /// Only start the run anew: there is no terminal.
     Options,
+    /// First make the glove's profile, which is not there, with this command.
+    Profile(Command),
     /// Nothing: the bridge is only watched. The command that calibrates its glove.
     None(Option<Command>),
 }
@@ -232,6 +234,9 @@ impl Hands {
             (Self::Options, _) => {
                 "the same with --calibrate-flat, the hand flat and still".to_owned()
             }
+            (Self::Profile(command), _) => {
+                format!("there is no profile of this glove: `{command}` makes one")
+            }
             (Self::None(Some(command)), _) => format!("`{command}` does it"),
             (Self::None(None), _) => "whoever drives calibrates it".to_owned(),
         }
@@ -240,7 +245,7 @@ impl Hands {
     fn open(&self) -> &'static str {
         match self {
             Self::Keys => "open the clutch (space)",
-            Self::Options | Self::None(_) => "open the clutch",
+            Self::Options | Self::Profile(_) | Self::None(_) => "open the clutch",
         }
     }
 }
@@ -343,6 +348,9 @@ mod tests {
             clutch,
             calibration: CalibrationState::default(),
             calibration_known: true,
+            profile: None,
+            headings: None,
+            ids: [None; SEGMENT_COUNT],
             frame_sequence: 1,
             on_chip: false,
             frame: None,

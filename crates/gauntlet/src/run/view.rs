@@ -3,12 +3,14 @@
 use std::time::{Duration, Instant};
 
 use bridge::State;
+use bridge::calibration::Lack;
 use bridge::clutch::Position;
 
 use super::shown::{self, Hands};
 use super::{Options, Run};
 use crate::live::View;
-use host::session::{CLOSED_TOO_LATE, Snapshot};
+use host::next::Command;
+use host::session::{CLOSED_TOO_LATE, Devices, Snapshot};
 
 impl Run {
     pub(super) fn view(&mut self, options: &Options, elapsed: Duration, keys: bool) -> View {
@@ -31,7 +33,7 @@ impl Run {
             dropped: progress.dropped,
             faults: self.faults_now(
                 snapshot.as_ref(),
-                &Hands::of(keys, options.drives, &self.devices),
+                &self.hands(snapshot.as_ref(), keys, options.drives),
             ),
             gripper_faults: progress.gripper_faults,
             keys: match (keys, options.drives) {
@@ -52,6 +54,19 @@ impl Run {
             view.gripper_age = shown::gripper_age(snapshot);
         }
         view
+    }
+
+    /// What whoever watches can do.
+    fn hands(&self, snapshot: Option<&Snapshot>, keys: bool, drives: bool) -> Hands {
+        let lack = snapshot.and_then(Snapshot::lacks);
+        match &self.devices {
+            Devices::Here { glove, .. }
+                if !self.straight && matches!(lack, Some(Lack::Profile | Lack::OwnProfile)) =>
+            {
+                Hands::Profile(Command::gauntlet("calibrate").path("--glove", glove))
+            }
+            devices => Hands::of(keys, drives, devices),
+        }
     }
 
     /// The state, and what a person can do about it.

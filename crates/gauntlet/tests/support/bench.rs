@@ -74,6 +74,7 @@ impl Bench {
             &gripper_path,
             "--model",
             model().to_str().unwrap(),
+            "--ideal",
             "--calibrate-flat",
             "--log",
             log.to_str().unwrap(),

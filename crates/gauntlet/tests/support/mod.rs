@@ -22,7 +22,14 @@ const DEADLINE: Duration = Duration::from_secs(300);
 pub fn command(arguments: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_gauntlet"));
     command.args(arguments).stdin(Stdio::null());
+    // Whatever the person who runs the tests prefers.
+    command.env("GAUNTLET_CONFIG", settings());
     command
+}
+
+/// A folder for settings and profiles that no test puts any into.
+fn settings() -> PathBuf {
+    Path::new(env!("CARGO_TARGET_TMPDIR")).join("no-settings")
 }
 
 /// Starts it; what it says is kept.

@@ -325,6 +325,34 @@ pub enum Found {
     Nothing,
 }
 
+/// The profile of the glove with these ids: the named one, else what they find among this user's. Else why there is none.
+///
+/// # Errors
+/// The named file is none, or this user's cannot be looked at.
+pub fn profile_of(
+    named: Option<&Path>,
+    ids: &[Option<UniqueId>; SEGMENT_COUNT],
+) -> Result<Result<(PathBuf, Box<Kept>), String>, Failure> {
+    let of_another = |path: &Path, misfit: Misfit| Ok(Err(format!("{}: {misfit}", path.display())));
+    if let Some(path) = named {
+        let kept = Kept::read(path)?;
+        return match kept.bound.fits(ids) {
+            Ok(()) => Ok(Ok((path.to_owned(), Box::new(kept)))),
+            Err(misfit) => of_another(path, misfit),
+        };
+    }
+    let store = ProfileStore::usual()?;
+    match store.find(ids)? {
+        Found::Fits(path, kept) => Ok(Ok((path, kept))),
+        Found::Nearly(path, misfit) => of_another(&path, misfit),
+        Found::Untold(misfit) => Ok(Err(misfit.to_string())),
+        Found::Nothing => {
+            let folder = store.folder().display();
+            Ok(Err(format!("there is no profile of it in {folder}")))
+        }
+    }
+}
+
 impl ProfileStore {
     /// Where this user's profiles lie.
     ///

@@ -2,7 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use bridge::protocol::message::{Devices, GripperStatus, Replies, Sample, Status};
+use bridge::calibration::ProfileState;
+use bridge::protocol::message::{Devices, GripperStatus, Headings, Replies, Sample, Status};
 use glove::scan::Health;
 use gripper::{Contact, link};
 
@@ -12,6 +13,8 @@ use crate::chip::link::{Error, HostLink};
 
 /// Pause between two questions.
 const EVERY: Duration = Duration::from_millis(250);
+/// Pause between two questions for the headings, which change slowly.
+const HEADINGS_EVERY: Duration = Duration::from_secs(1);
 /// The same to a bridge that never answered this one: its firmware is from before it.
 const RARELY: Duration = Duration::from_secs(5);
 /// Questions without an answer after which it is taken for one, and what one that answered before said is not known any more.
@@ -23,6 +26,9 @@ const FRESH_MS: u32 = 200;
 #[derive(Debug)]
 pub(super) struct Told {
     told: Option<Devices>,
+    headings: Option<Headings>,
+    asked_headings: Option<Instant>,
+    missed_headings: u32,
     /// It has answered before.
     answers: bool,
     asked: Instant,
@@ -40,6 +46,9 @@ impl Told {
         let now = Instant::now();
         let mut known = Self {
             told: None,
+            headings: None,
+            asked_headings: None,
+            missed_headings: 0,
             answers: false,
             asked: now.checked_sub(EVERY).unwrap_or(now),
             missed: 0,
@@ -66,6 +75,52 @@ impl Told {
         };
         self.asked = Instant::now();
         Ok(self.take(answer))
+    }
+
+    /// Asks a bridge that answers such questions once a second where the answer can come by `end`.
+    pub fn ask_headings(&mut self, link: &mut HostLink, end: Instant) -> Result<(), Error> {
+        let every = match (&self.headings, self.missed_headings) {
+            (None, MISSED..) => RARELY,
+            _ => HEADINGS_EVERY,
+        };
+        let due = self.asked_headings.is_none_or(|at| at.elapsed() >= every);
+        if !self.answers || !due {
+            return Ok(());
+        }
+        if let Some(answer) = link.headings_by(end)? {
+            self.asked_headings = Some(Instant::now());
+            match answer {
+                Some(headings) => {
+                    (self.headings, self.missed_headings) = (Some(headings), 0);
+                }
+                None => {
+                    self.missed_headings = self.missed_headings.saturating_add(1);
+                    if self.missed_headings >= MISSED {
+                        self.headings = None;
+                    }
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether the glove's profile is there.
+    pub fn profile(&self) -> Option<ProfileState> {
+        self.headings.as_ref().map(|headings| headings.profile)
+    }
+
+    /// What is known of the headings.
+    pub fn headings(&self) -> Option<snapshot::Headings> {
+        let told = self.headings.as_ref();
+        let told = told.filter(|told| told.profile.is_there)?;
+        Some(snapshot::Headings {
+            sigma: told.sigma,
+            drift: told.drift,
+            degraded: told.degraded,
+            unknown: told.unknown,
+            poses: told.poses,
+            pose: told.pose,
+        })
     }
 
     /// What came of a question.

@@ -7,9 +7,10 @@ use bridge::Epoch;
 use bridge::HoldReason;
 use bridge::calibration::{CalibrationState, Refusal, Try};
 use bridge::clutch::{HeartbeatRefusal, Position};
-use bridge::event::Kind;
+use bridge::event::{Kind, Request};
 use bridge::protocol;
 use bridge::protocol::message::{Counters, Sample, Status};
+use glove::calibration::Bound;
 
 use super::axes::Axes;
 use super::calibrating::told;
@@ -53,6 +54,8 @@ pub(super) struct Left {
 #[derive(Debug, Clone, Copy)]
 struct Trying {
     until: Instant,
+    /// Sensors that sit straight; else the headings by the profile.
+    is_straight: bool,
     /// Tries that had ended when the newest began.
     ended: u16,
 }
@@ -186,6 +189,9 @@ impl Worker {
     fn round(&mut self) -> Result<bool, Error> {
         let begun = Instant::now();
         let mut quiet = self.epoch.is_none();
+        if let Some(profile) = self.orders.profile() {
+            self.set_profile(profile.as_ref())?;
+        }
         while let Some(order) = self.orders.next() {
             if order == Order::Stop {
                 return Ok(false);
@@ -202,6 +208,8 @@ impl Worker {
         if quiet {
             self.count(begun + HEARTBEAT)?;
             self.look_at_devices(begun + HEARTBEAT)?;
+            self.devices
+                .ask_headings(&mut self.link, begun + HEARTBEAT)?;
         }
         for sample in self.link.listen(LISTEN)? {
             let blocked = |axis| self.devices.is_blocked(axis);
@@ -244,20 +252,44 @@ impl Worker {
                 (self.touched, self.activation_asked) = (true, true);
                 self.link.activate()?;
             }
-            Order::Calibrate(_) if self.epoch.is_some() => {
+            Order::FlatPose(_) | Order::CalibrateStraight(_) if self.epoch.is_some() => {
                 self.calibrated(Try::Refused(Refusal::Engaged));
             }
-            Order::Calibrate(wait) => {
-                let ended = self.link.health()?.calibration.ended;
-                self.link.calibrate_flat_hand()?;
-                let until = Instant::now() + Duration::from_micros(wait.as_micros());
-                self.trying = Some(Trying { until, ended });
-                self.calibration.newest = Try::Waiting;
-            }
+            Order::FlatPose(wait) => self.begin_try(wait, false)?,
+            Order::CalibrateStraight(wait) => self.begin_try(wait, true)?,
             Order::UndoCalibration => self.link.undo_calibration()?,
+            Order::FindFlat(on) => self.link.find_flat(on)?,
             Order::Stop => {}
         }
         Ok(())
+    }
+
+    fn begin_try(&mut self, wait: gripper::Duration, is_straight: bool) -> Result<(), Error> {
+        let ended = self.link.health()?.calibration.ended;
+        calibrate(&mut self.link, is_straight)?;
+        self.trying = Some(Trying {
+            until: Instant::now() + Duration::from_micros(wait.as_micros()),
+            is_straight,
+            ended,
+        });
+        self.calibration.newest = Try::Waiting;
+        Ok(())
+    }
+
+    /// Another profile, kept by the bridge; refused while the clutch is closed.
+    fn set_profile(&mut self, profile: Option<&Bound>) -> Result<(), Error> {
+        match self.link.set_profile(profile) {
+            Err(Error::Refused(protocol::message::Refusal::Engaged)) => {
+                let kind = Kind::Refused(Request::Profile);
+                self.hub.lock().happened(Happened {
+                    sort: Sort::Fault,
+                    text: kind.to_string(),
+                    kind,
+                });
+                Ok(())
+            }
+            done => done,
+        }
     }
 
     fn heartbeat(&mut self, epoch: Epoch) -> Result<(), Error> {
@@ -318,9 +350,9 @@ impl Worker {
         };
         match now.newest {
             _ if now.ended == trying.ended => {}
-            Try::Refused(why) if Instant::now() < trying.until && why != Refusal::Engaged => {
+            Try::Refused(why) if Instant::now() < trying.until && may_come(why) => {
                 trying.ended = now.ended;
-                self.link.calibrate_flat_hand()?;
+                calibrate(&mut self.link, trying.is_straight)?;
             }
             newest => {
                 self.trying = None;
@@ -404,6 +436,9 @@ impl Worker {
             clutch: self.clutch,
             calibration,
             calibration_known: self.calibration_known,
+            profile: self.devices.profile(),
+            headings: self.devices.headings(),
+            ids: [None; glove::hand::SEGMENT_COUNT],
             frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
             on_chip: true,
             frame: None,
@@ -423,4 +458,19 @@ impl Worker {
         };
         self.hub.lock().say(seen, self.useless);
     }
+}
+
+fn calibrate(link: &mut HostLink, is_straight: bool) -> Result<(), Error> {
+    match is_straight {
+        true => link.calibrate_straight(),
+        false => link.calibrate_flat_hand(),
+    }
+}
+
+/// Whether what was refused so may be taken when it is tried again.
+fn may_come(why: Refusal) -> bool {
+    !matches!(
+        why,
+        Refusal::Engaged | Refusal::NoProfile | Refusal::OtherGlove
+    )
 }

@@ -7,6 +7,7 @@ use std::thread::JoinHandle;
 
 use anyhow::Result;
 use bridge::{App, Board, WeightsStore};
+use glove::calibration::Bound;
 use glove::hand::Side;
 use glove::scan::{self, Scanner};
 use gripper::driver::{ThreeFinger, TwoFinger};
@@ -41,6 +42,8 @@ pub struct Parts {
     pub image: Vec<u8>,
     /// Which hand wears the glove.
     pub side: Side,
+    /// The glove's profile, if it has one.
+    pub profile: Option<Bound>,
     /// Whom every frame, command, status and event is handed to.
     pub feed: Option<Feed>,
 }
@@ -96,7 +99,7 @@ impl InProcess {
         let platform = Pc::new(clock, watches, interrupt.clone());
         let mut worker = Worker::new(queue, hub.clone(), parts.feed);
         let line = parts.gripper.driver_config(parts.line);
-        let (glove, gripper) = (parts.glove, parts.gripper);
+        let (glove, gripper, profile) = (parts.glove, parts.gripper, parts.profile);
         let bridge = std::thread::Builder::new().name("bridge".to_owned());
         let (tell_scheduling, scheduling) = std::sync::mpsc::sync_channel(1);
         let start = move || {
@@ -108,6 +111,10 @@ impl InProcess {
                 let scanner = Scanner::new(glove, scan).with_set_baud();
                 let gripper = driver(gripper, line);
                 let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);
+                if let Some(profile) = &profile {
+                    // The clutch is open.
+                    let _ = app.set_profile(Some(profile));
+                }
                 worker.scheduling = scheduling.recv().unwrap_or(Scheduling::Shared);
                 worker.run(&mut app)
             })

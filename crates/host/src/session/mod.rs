@@ -8,6 +8,7 @@
 //! gripper's axes is a constant inside the thread and erased here ([`axes::Axes`]).
 
 use anyhow::Result;
+use glove::calibration::Bound;
 
 use crate::lines::port::Watch;
 use crate::realtime::Scheduling;
@@ -88,5 +89,10 @@ pub trait Session: core::fmt::Debug {
     /// Tells the bridge something. Returns whether it was taken: not when the queue is full or the bridge has ended.
     fn order(&self, order: Order) -> bool {
         self.orders().give(order)
+    }
+
+    /// Gives the glove another profile, or none: [`Orders::set_profile`].
+    fn set_profile(&self, profile: Option<Bound>) {
+        self.orders().set_profile(profile);
     }
 }

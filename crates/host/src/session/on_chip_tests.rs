@@ -162,7 +162,9 @@ fn a_hand_that_is_refused_under_a_calibration_says_that_it_stays_and_is_no_fault
     let session = following(&bridge);
     let mut seen = 0;
     session.hub().happened(&mut seen);
-    session.order(Order::Calibrate(gripper::Duration::from_millis(100)));
+    session.order(Order::CalibrateStraight(gripper::Duration::from_millis(
+        100,
+    )));
     until(&session, |seen| {
         matches!(seen.calibration.newest, Try::Refused(_))
     });

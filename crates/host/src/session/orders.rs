@@ -1,10 +1,11 @@
 //! What a bridge can be told, by as many as like to: one bounded queue, in which orders meet.
 
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bridge::timing::{HEARTBEAT_TIMEOUT, is_within};
+use glove::calibration::Bound;
 use gripper::{Duration, Instant};
 
 use crate::clock::Clock;
@@ -23,10 +24,15 @@ pub enum Order {
     Release,
     /// Activate the gripper: the fingers move.
     Activate,
-    /// Take the hand as flat, once it has been still for a second; within so long.
-    Calibrate(Duration),
-    /// Take the newest calibration back.
+    /// Take the headings of the profile's sensors from the flat hand, once it has been still for a second; within so long.
+    FlatPose(Duration),
+    /// Take the hand as flat, for virtual sensors that sit straight and share a heading, once it has been still for a second;
+    /// within so long.
+    CalibrateStraight(Duration),
+    /// Take the newest flat pose or calibration back.
     UndoCalibration,
+    /// Find flat poses while the hand works, or do not.
+    FindFlat(bool),
     /// Hold, and end.
     Stop,
 }
@@ -54,6 +60,7 @@ struct Given {
 #[derive(Debug, Clone)]
 pub struct Orders {
     queue: SyncSender<Given>,
+    profile: Arc<Mutex<Option<Option<Bound>>>>,
     stop: Arc<AtomicBool>,
     too_late: Arc<AtomicU32>,
     clock: Clock,
@@ -65,14 +72,17 @@ impl Orders {
         let (queue, given) = sync_channel(ORDERS);
         let stop = Arc::new(AtomicBool::new(false));
         let too_late = Arc::new(AtomicU32::new(0));
+        let profile = Arc::new(Mutex::new(None));
         let taken = Queue {
             given,
+            profile: Arc::clone(&profile),
             stop: Arc::clone(&stop),
             too_late: Arc::clone(&too_late),
             clock,
         };
         let orders = Self {
             queue,
+            profile,
             stop,
             too_late,
             clock,
@@ -91,6 +101,13 @@ impl Orders {
         self.queue.try_send(Given { order, at }).is_ok()
     }
 
+    /// Gives the glove another profile, or none. It has a place of its own, in which the newest wins; events tell whether it was taken:
+    /// not while the clutch is closed.
+    pub fn set_profile(&self, profile: Option<Bound>) {
+        let mut place = self.profile.lock().unwrap_or_else(PoisonError::into_inner);
+        *place = Some(profile);
+    }
+
     /// Orders to close the clutch or to activate that were passed over so far, since they were too old when they came.
     pub fn too_late(&self) -> u32 {
         self.too_late.load(Ordering::Relaxed)
@@ -101,12 +118,19 @@ impl Orders {
 #[derive(Debug)]
 pub struct Queue {
     given: Receiver<Given>,
+    profile: Arc<Mutex<Option<Option<Bound>>>>,
     stop: Arc<AtomicBool>,
     too_late: Arc<AtomicU32>,
     clock: Clock,
 }
 
 impl Queue {
+    /// The newest profile that was given and not taken yet.
+    pub fn profile(&self) -> Option<Option<Bound>> {
+        let mut place = self.profile.lock().unwrap_or_else(PoisonError::into_inner);
+        place.take()
+    }
+
     /// The next order; never waits. What makes motion possible and is older than a heartbeat lasts is passed over, and all of
     /// it once the end was ordered.
     pub fn next(&self) -> Option<Order> {

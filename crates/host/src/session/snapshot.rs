@@ -1,9 +1,11 @@
 //! The state of everything at one moment, whatever the gripper's number of axes and wherever the bridge runs.
 
-use bridge::calibration::CalibrationState;
+use bridge::calibration::{CalibrationState, Lack, ProfileState};
 use bridge::clutch::Position;
 use bridge::{State, Telemetry};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
+use glove::headings::PoseReport;
+use glove::imu::UniqueId;
 use glove::scan;
 use gripper::{Activation, Contact, Fault, Instant};
 
@@ -96,6 +98,12 @@ pub struct Snapshot {
     pub calibration: CalibrationState,
     /// The bridge has said so. One of an older version never does.
     pub calibration_known: bool,
+    /// Whether the glove's profile is there; `None` where the bridge does not say.
+    pub profile: Option<ProfileState>,
+    /// What is known of the headings; `None` without a profile, and where the bridge does not say.
+    pub headings: Option<Headings>,
+    /// The sensors' unique ids, as they are wired, as far as they were read; none from a chip.
+    pub ids: [Option<UniqueId>; SEGMENT_COUNT],
     /// Counts frames taken; 0: none yet.
     pub frame_sequence: u32,
     /// Whether the bridge runs on a chip, of which no events come.
@@ -128,6 +136,23 @@ pub struct Snapshot {
     pub line: Option<gripper::link::Counters>,
     /// Steps of the supervisor that came late.
     pub late_steps: u32,
+}
+
+/// The headings of a glove with a profile. By segment: of the joint between it and its parent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Headings {
+    /// How sure each is: standard deviation, radians; infinite where there is none.
+    pub sigma: [f32; SEGMENT_COUNT],
+    /// How fast it drifts, radians a second.
+    pub drift: [f32; SEGMENT_COUNT],
+    /// Joints that are held because theirs is not sure enough (bit k).
+    pub degraded: u16,
+    /// Joints without one (bit k).
+    pub unknown: u16,
+    /// Counts flat poses taken. Wraps.
+    pub poses: u16,
+    /// The newest of them.
+    pub pose: Option<PoseReport>,
 }
 
 /// The glove's sensors.
@@ -166,6 +191,16 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
             clutch: now.clutch,
             calibration: now.calibration,
             calibration_known: true,
+            profile: Some(now.profile),
+            headings: now.profile.is_there.then(|| Headings {
+                sigma: now.sigma,
+                drift: now.drift,
+                degraded: now.degraded,
+                unknown: now.unknown,
+                poses: now.poses,
+                pose: now.pose,
+            }),
+            ids: [None; SEGMENT_COUNT],
             frame_sequence: now.frame_sequence,
             on_chip: false,
             frame: now.frame,
@@ -199,6 +234,9 @@ impl Snapshot {
             clutch,
             calibration: CalibrationState::default(),
             calibration_known: true,
+            profile: Some(ProfileState::default()),
+            headings: None,
+            ids: [None; SEGMENT_COUNT],
             frame_sequence: 1,
             on_chip: false,
             frame: None,
@@ -223,6 +261,12 @@ impl Snapshot {
     /// The glove is known not to be calibrated: nothing can follow it.
     pub fn lacks_calibration(&self) -> bool {
         self.calibration_known && !self.calibration.is_calibrated
+    }
+
+    /// What the glove lacks, if it is known not to be calibrated.
+    pub fn lacks(&self) -> Option<Lack> {
+        let profile = self.profile.filter(|_| self.lacks_calibration());
+        profile.map(ProfileState::lacks)
     }
 
     /// The sensors that are not used, by name, with what is wrong with them.

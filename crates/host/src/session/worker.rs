@@ -94,6 +94,10 @@ impl Worker {
     where
         Pc: Board<X>,
     {
+        if let Some(profile) = self.orders.profile() {
+            // An event tells where it is refused.
+            let _ = app.set_profile(profile.as_ref());
+        }
         while let Some(order) = self.orders.next() {
             match order {
                 Order::Engage => self.epoch = Some(app.engage()),
@@ -108,7 +112,9 @@ impl Worker {
                     self.activation_asked = true;
                     app.activate();
                 }
-                Order::Calibrate(wait) => app.calibrate_flat_hand_within(wait),
+                Order::FlatPose(wait) => app.calibrate_flat_hand_within(wait),
+                Order::CalibrateStraight(wait) => app.calibrate_straight_within(wait),
+                Order::FindFlat(on) => app.set_finds_flat(on),
                 Order::UndoCalibration => app.undo_calibration(),
                 Order::Stop => return self.end(app),
             }
@@ -202,7 +208,11 @@ impl Worker {
         let useless = telemetry.frame_sequence > 0 && !telemetry.angles_valid;
         said.totals
             .here(&telemetry.counters, telemetry.now, self.scheduling);
-        said.say(Snapshot::from(&telemetry), useless);
+        let seen = Snapshot {
+            ids: app.scanner_mut().ids(),
+            ..Snapshot::from(&telemetry)
+        };
+        said.say(seen, useless);
     }
 
     fn command_record<const X: usize>(&self, sent: &Sent<X>) -> Command {
@@ -264,6 +274,10 @@ fn sort(kind: &Kind) -> Sort {
         Kind::GripperFault(fault) => *fault != gripper::Fault::None,
         Kind::SensorLost { .. }
         | Kind::SensorRestarted { .. }
+        | Kind::HeadingLost { .. }
+        | Kind::Unsure { .. }
+        | Kind::SensorSlipped { .. }
+        | Kind::ProfileMisfit(_)
         | Kind::Sensors(_)
         | Kind::AxisStands { .. }
         | Kind::Glove { answers: false }

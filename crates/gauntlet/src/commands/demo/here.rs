@@ -77,6 +77,7 @@ fn devices(
         line: host::lines::Settings::default(),
         image,
         side: Side::Right,
+        profile: None,
         feed,
     };
     Ok(([glove, gripper], parts))

@@ -8,7 +8,7 @@ use glove::hand::Side;
 
 use crate::commands::teleop::Hand as WhichHand;
 use crate::tell::Tell;
-use host::calibration::{Found, Kept, ProfileStore};
+use host::calibration::profile_of;
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -57,6 +57,25 @@ impl GloveAt {
         clock: Clock,
         interrupt: &Interrupt,
     ) -> Result<Opened> {
+        let (scanning, missing) = self.read(tell, clock, interrupt)?;
+        let hand = self.known(&scanning, tell)?;
+        Ok(Opened {
+            scanning,
+            hand,
+            missing,
+        })
+    }
+
+    /// The same without looking for its profile; how many sensors give no orientation.
+    ///
+    /// # Errors
+    /// As [`GloveAt::open`].
+    pub(in crate::commands) fn read(
+        &self,
+        tell: &Tell,
+        clock: Clock,
+        interrupt: &Interrupt,
+    ) -> Result<(Scanning, usize)> {
         let place = self.glove.display();
         if let Some(warning) = list::latency_warning(&self.glove) {
             tell.say(format_args!("warning: {place}: {warning}"));
@@ -85,12 +104,7 @@ impl GloveAt {
                 tell.say(format_args!("  try: {next}"));
             }
         }
-        let hand = self.known(&scanning, tell)?;
-        Ok(Opened {
-            scanning,
-            hand,
-            missing: missing.faults(),
-        })
+        Ok((scanning, missing.faults()))
     }
 
     /// The hand in it, by ideal sensors or by a profile; else why there is none.
@@ -99,20 +113,10 @@ impl GloveAt {
             return Ok(Ok(Hand::ideal(self.side())));
         }
         let ids = scanning.snapshot().map_or([None; 16], |seen| seen.ids());
-        let (path, kept) = match &self.profile {
-            Some(path) => (path.clone(), Box::new(Kept::read(path)?)),
-            None => match ProfileStore::usual()?.find(&ids)? {
-                Found::Fits(path, kept) => (path, kept),
-                Found::Nearly(path, misfit) => {
-                    return Ok(Err(format!("{}: {misfit}", path.display())));
-                }
-                Found::Untold(misfit) => return Ok(Err(misfit.to_string())),
-                Found::Nothing => return Ok(Err("there is no profile of it".to_owned())),
-            },
+        let (path, kept) = match profile_of(self.profile.as_deref(), &ids)? {
+            Ok(found) => found,
+            Err(why) => return Ok(Err(why)),
         };
-        if let Err(misfit) = kept.bound.fits(&ids) {
-            return Ok(Err(format!("{}: {misfit}", path.display())));
-        }
         tell.say(format_args!(
             "profile  {}  of {}, {}",
             path.display(),

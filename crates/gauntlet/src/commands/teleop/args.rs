@@ -22,9 +22,10 @@ pub enum Hand {
 #[command(after_help = "\
 Examples:
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --ideal --calibrate-flat --engage --activate --seconds 10
 
-Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
+The glove's profile (`gauntlet calibrate`) is found by its sensors' ids; after each power-on of the glove one flat pose \
+gives the headings: `--calibrate-flat`, or the key c. Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
 `--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \
 by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
 pub struct Teleop {
@@ -46,10 +47,16 @@ pub struct Teleop {
     /// Activate the gripper if it is not: the fingers move.
     #[arg(long)]
     pub activate: bool,
-    /// Which hand wears the glove.
+    /// The glove's profile, if not the one that is found by its sensors' ids.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "ideal")]
+    pub profile: Option<PathBuf>,
+    /// Take the sensors as ideal: sewn on straight, with one heading. One flat pose then calibrates them. Virtual gloves only.
+    #[arg(long)]
+    pub ideal: bool,
+    /// Which hand wears the glove, where no profile says.
     #[arg(long, value_enum, default_value_t = Hand::Right)]
     pub hand: Hand,
-    /// Calibrate on the flat hand before the clutch may close: waits up to 30 s until it lies still for a second.
+    /// Take the flat hand before the clutch may close: waits up to 30 s until it lies still.
     #[arg(long)]
     pub calibrate_flat: bool,
     /// How the gripper's line differs from that of a gripper as delivered.

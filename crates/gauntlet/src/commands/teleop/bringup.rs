@@ -11,6 +11,7 @@ use gripper::Activation;
 use super::args::Teleop;
 use crate::run::Run;
 use crate::tell::Tell;
+use host::calibration::profile_of;
 use host::diagnose;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -58,6 +59,9 @@ pub(super) fn prepare(
         return Ok(Prepared::NoFrames);
     }
     tell_missing(run, tell)?;
+    if !options.ideal {
+        find_profile(options, run, tell)?;
+    }
     if options.calibrate_flat && !run.calibrate(tell)? {
         return Ok(Prepared::Ended);
     }
@@ -89,6 +93,42 @@ pub(super) fn prepare(
         "not activated: you can watch the hand, the gripper will not move"
     ));
     Ok(Prepared::Ready)
+}
+
+/// Finds the glove's profile by its sensors' ids. Where there is none nothing follows: that is told, and refused where a flat pose with
+/// it was asked for.
+fn find_profile(options: &Teleop, run: &mut Run, tell: &Tell) -> Result<()> {
+    let any = |seen: &Snapshot| seen.ids.iter().any(Option::is_some);
+    run.wait(STRAGGLERS, any)?;
+    let ids = run
+        .snapshot()
+        .map_or([None; SEGMENT_COUNT], |seen| seen.ids);
+    let why = match profile_of(options.profile.as_deref(), &ids)? {
+        Ok((path, kept)) => {
+            tell.say(format_args!(
+                "profile  {}  of {}, {}",
+                path.display(),
+                kept.calibrated,
+                kept.quality.verdict
+            ));
+            run.wears(Some(kept.bound));
+            return Ok(());
+        }
+        Err(why) => why,
+    };
+    run.wears(None);
+    let place = options.glove.display();
+    let what = format!("the glove on {place} is not calibrated, and moves nothing: {why}");
+    let next = Command::gauntlet("calibrate")
+        .path("--glove", &options.glove)
+        .then("; a virtual glove whose sensors sit straight: ")
+        .then(NextStep::same(Command::more().word("--ideal")));
+    if options.calibrate_flat || options.profile.is_some() {
+        return Err(Failure::new(what, next).into());
+    }
+    tell.say(format_args!("warning: {what}"));
+    tell.say(format_args!("  try: {next}"));
+    Ok(())
 }
 
 /// Names the sensors that did not come up, as `doctor` does: their joints are held.

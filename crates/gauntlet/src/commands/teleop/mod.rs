@@ -83,6 +83,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         line,
         image,
         side: side(options.hand),
+        profile: None,
         feed,
     };
     let session = InProcess::start(parts, clock, interrupt)?;

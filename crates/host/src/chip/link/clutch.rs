@@ -3,7 +3,9 @@
 use std::time::{Duration, Instant};
 
 use bridge::clutch::HeartbeatRefusal;
-use bridge::protocol::message::{Answer, Call, Counters, Devices, Health, Refusal, Status};
+use bridge::protocol::message::{
+    Answer, Call, Counters, Devices, Headings, Health, Refusal, Status,
+};
 
 use super::{Epoch, Error, HostLink, as_health, as_status, confused};
 
@@ -98,6 +100,19 @@ impl HostLink {
     pub fn devices_by(&mut self, end: Instant) -> Result<Option<Option<Devices>>, Error> {
         match self.ask_by(&Call::Devices, end)? {
             Some(Some(Answer::Devices(devices))) => Ok(Some(Some(devices))),
+            Some(Some(other)) => Err(confused(&other)),
+            Some(None) => Ok(Some(None)),
+            None => Ok(None),
+        }
+    }
+
+    /// How sure its headings are, asked once: as [`HostLink::devices_by`].
+    ///
+    /// # Errors
+    /// As [`HostLink::counters_by`].
+    pub fn headings_by(&mut self, end: Instant) -> Result<Option<Option<Headings>>, Error> {
+        match self.ask_by(&Call::Headings, end)? {
+            Some(Some(Answer::Headings(headings))) => Ok(Some(Some(headings))),
             Some(Some(other)) => Err(confused(&other)),
             Some(None) => Ok(Some(None)),
             None => Ok(None),

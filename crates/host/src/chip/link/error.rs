@@ -3,6 +3,7 @@
 use std::fmt;
 
 use bridge::protocol::message::{Refusal, SETTING_NAMES, VERSION};
+use bridge::store::profile;
 
 use super::Address;
 use crate::failure::Failure;
@@ -221,6 +222,7 @@ pub fn refusal_words(refusal: &Refusal) -> String {
         Refusal::Period { least_ms } => {
             format!("telemetry comes every {least_ms} ms at the fastest")
         }
+        Refusal::Profile(error) => error.to_string(),
     }
 }
 
@@ -244,5 +246,13 @@ pub fn refusal_next(refusal: &Refusal, bridge: &Address) -> NextStep {
             least, greatest, ..
         } => format!("a value from {least} to {greatest}").into(),
         Refusal::Period { least_ms } => format!("a period of {least_ms} ms or more").into(),
+        Refusal::Profile(profile::Error::NoProfile) => {
+            "calibrating this glove, which makes its profile".into()
+        }
+        Refusal::Profile(profile::Error::NoStore) => {
+            "firmware that keeps a profile".into()
+        }
+        Refusal::Profile(profile::Error::Unreadable(_)) => "calibrating this glove anew".into(),
+        Refusal::Profile(_) => "the same command again".into(),
     }
 }

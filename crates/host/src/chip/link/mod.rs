@@ -8,6 +8,7 @@ mod clutch;
 mod error;
 mod flash;
 mod line;
+mod profile;
 #[cfg(test)]
 mod tests;
 
@@ -18,7 +19,7 @@ use bridge::Epoch;
 use bridge::protocol::frame::{self, Decoder};
 use bridge::protocol::message::{
     Answer, Call, Counters, FromBridge, Health, Hello, OLDEST_ASKED, Refusal, Reply, Request,
-    Sample, Slots, Status, VERSION,
+    Sample, Scan, Slots, Status, VERSION,
 };
 
 pub use clutch::Heartbeat;
@@ -42,6 +43,9 @@ const BUSY_PAUSE: Duration = Duration::from_millis(250);
 /// Samples kept until somebody takes them; older ones go first.
 const SAMPLES: usize = 256;
 
+/// The same of scans; their numbers show which are gone.
+const SCANS: usize = 256;
+
 /// A conversation with a bridge.
 #[derive(Debug)]
 pub struct HostLink {
@@ -52,6 +56,7 @@ pub struct HostLink {
     sequence: u16,
     hello: Option<Hello>,
     samples: VecDeque<Sample>,
+    scans: VecDeque<Scan>,
     repeats: u32,
     /// Since the newest request was first sent.
     heard: Heard,
@@ -73,6 +78,7 @@ impl HostLink {
             sequence: 0,
             hello: None,
             samples: VecDeque::new(),
+            scans: VecDeque::new(),
             repeats: 0,
             heard: Heard::default(),
             asked: Vec::new(),
@@ -168,9 +174,11 @@ impl HostLink {
         let wait = match call {
             Call::WeightsBegin { .. }
             | Call::WeightsCommit
+            | Call::ProfileCommit { .. }
+            | Call::ProfileErase
             | Call::SelectSlot { .. }
             | Call::Slots => FLASH_WAIT,
-            Call::WeightsChunk { .. } => CHUNK_WAIT,
+            Call::WeightsChunk { .. } | Call::ProfileChunk { .. } => CHUNK_WAIT,
             _ => REPLY_WAIT,
         };
         self.ask(call, wait, ATTEMPTS)
@@ -247,6 +255,13 @@ impl HostLink {
                     }
                     self.samples.push_back(sample);
                 }
+                Some(Ok(FromBridge::Scan(scan))) => {
+                    self.heard.samples += 1;
+                    if self.scans.len() == SCANS {
+                        self.scans.pop_front();
+                    }
+                    self.scans.push_back(scan);
+                }
             }
         }
         Ok(None)
@@ -280,13 +295,23 @@ impl HostLink {
         as_health(self.call(&Call::Health)?)
     }
 
-    /// Takes the hand, flat and still, as all joints at zero; [`HostLink::health`] tells how it ended.
+    /// Takes the headings of the profile's sensors from the hand, flat and still; [`HostLink::health`] tells how it ended.
     ///
     /// # Errors
     /// As [`HostLink::health`].
     pub fn calibrate_flat_hand(&mut self) -> Result<(), Error> {
         self.require_own_version("calibration")?;
         self.done(&Call::CalibrateFlatHand)
+    }
+
+    /// Takes the hand, flat and still, as all joints at zero, for sensors that sit straight and share a heading;
+    /// [`HostLink::health`] tells how it ended.
+    ///
+    /// # Errors
+    /// As [`HostLink::health`].
+    pub fn calibrate_straight(&mut self) -> Result<(), Error> {
+        self.require_own_version("calibration")?;
+        self.done(&Call::CalibrateStraight)
     }
 
     /// Takes the newest calibration back.

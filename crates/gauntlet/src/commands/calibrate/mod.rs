@@ -1,0 +1,292 @@
+//! `gauntlet calibrate`: a glove gets to know a hand, and a file remembers it.
+
+mod flat;
+mod list;
+mod session;
+
+use std::path::{Path, PathBuf};
+use std::time::SystemTime;
+
+use anyhow::Result;
+use clap::Args;
+use glove::calibration::{Misfit, Verdict};
+use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES, Side};
+use glove::imu::UniqueId;
+
+use crate::commands::glove::GloveAt;
+use crate::commands::teleop::Hand as WhichHand;
+use crate::outputs::{self, Kind};
+use crate::results::{self, calibrations, gloves};
+use crate::tell::Tell;
+use host::calibration::guide::Finding;
+use host::calibration::{Judged, ProfileStore};
+use host::clock::{self, Clock};
+use host::failure::Failure;
+use host::interrupt::Interrupt;
+use host::next::{Command, NextStep, advice};
+use host::scanning::Snapshot;
+use session::{Led, Session};
+
+/// Options of `calibrate`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Examples:
+  gauntlet calibrate --glove /dev/ttyUSB0                 the guided session, a minute
+  gauntlet calibrate --glove /dev/ttyUSB0 --hand left     … and the glove must turn out to be a left one
+  gauntlet calibrate --glove /dev/ttyUSB0 --flat          next day: does the profile still fit?
+  gauntlet calibrate --list                               the profiles that are there
+
+Wear the glove and sit at a table. The hand lies flat, turns, lies flat, bends one finger after the other, makes fists, \
+moves the thumb, moves freely and lies flat once more: each is asked for in words and drawn, and what is not seen is asked again. \
+Keys: space begins, r does a step again, q ends. Without a terminal it begins by itself. \
+The profile goes into a file bound to the sensors' unique ids, where `teleop` finds it. \
+It is written when every check holds or leaves doubts; what is bad is not, but with --keep-anyway. \
+A virtual glove's person does what is asked by itself (`gauntlet simulate --honest 1`). Exit code 1 where nothing is kept.")]
+pub struct Calibrate {
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT", required_unless_present = "list")]
+    pub glove: Option<PathBuf>,
+    /// Which hand should wear it; a glove that turns out to be on the other one is refused.
+    #[arg(long, value_enum)]
+    pub hand: Option<WhichHand>,
+    /// Write the profile into this file instead of among the others.
+    #[arg(long, value_name = "FILE.toml", conflicts_with = "list")]
+    pub out: Option<PathBuf>,
+    /// Take sensors that sit elsewhere than they are wired as they sit.
+    #[arg(long, conflicts_with = "list")]
+    pub as_they_sit: bool,
+    /// Keep the profile although a check says that it is bad.
+    #[arg(long, conflicts_with = "list")]
+    pub keep_anyway: bool,
+    /// One flat pose of 2 s with the profile there is: whether a sensor has slipped since.
+    #[arg(long, conflicts_with_all = ["list", "out", "as_they_sit", "keep_anyway"])]
+    pub flat: bool,
+    /// The profile for --flat, instead of the one that the glove's ids find.
+    #[arg(long, value_name = "FILE.toml", requires = "flat")]
+    pub profile: Option<PathBuf>,
+    /// List the profiles that are there; no glove is needed.
+    #[arg(long)]
+    pub list: bool,
+    /// Print the result as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Calibrates, looks whether a calibration still fits, or lists.
+///
+/// # Errors
+/// A failure that names the port, the sensor or the file; that nothing was kept, and why.
+pub(crate) fn run(options: &Calibrate, interrupt: &Interrupt) -> Result<()> {
+    match &options.glove {
+        _ if options.list => list::run(options.json),
+        Some(glove) if options.flat => flat::run(options, glove, interrupt),
+        Some(glove) => guided(options, glove, interrupt),
+        None => Err(Failure::usage("no glove is named", "--glove PORT").into()),
+    }
+}
+
+impl Calibrate {
+    /// The glove at a port, as other verbs know it.
+    fn at(&self, glove: &Path) -> GloveAt {
+        GloveAt {
+            glove: glove.to_owned(),
+            profile: self.profile.clone(),
+            ideal: false,
+            hand: self.hand.unwrap_or(WhichHand::Right),
+            json: self.json,
+        }
+    }
+
+    fn declared(&self) -> Option<Side> {
+        self.hand.map(|hand| match hand {
+            WhichHand::Right => Side::Right,
+            WhichHand::Left => Side::Left,
+        })
+    }
+}
+
+/// The ids of a whole glove.
+fn ids(seen: Option<&Snapshot>, at: &GloveAt) -> Result<[UniqueId; SEGMENT_COUNT], Failure> {
+    let ids = seen.map_or([None; SEGMENT_COUNT], Snapshot::ids);
+    let lacks: Vec<&str> = (0..SEGMENT_COUNT)
+        .filter(|&k| ids[k].is_none())
+        .map(|k| SEGMENT_NAMES[k])
+        .collect();
+    let place = at.glove.display();
+    if !lacks.is_empty() {
+        let what = format!(
+            "a profile is bound to its sensors' unique ids, and the glove on {place} has none of {}",
+            lacks.join(", ")
+        );
+        return Err(Failure::new(what, at.doctor()));
+    }
+    let known = ids.map(Option::unwrap_or_default);
+    let alike =
+        (0..SEGMENT_COUNT).filter(|&k| known.iter().filter(|id| **id == known[k]).count() > 1);
+    let alike = alike.fold(0u16, |mask, k| mask | 1 << k);
+    match alike {
+        0 => Ok(known),
+        _ => {
+            let what = format!("the glove on {place}: {}", Misfit::Alike(alike));
+            Err(Failure::new(what, at.doctor()))
+        }
+    }
+}
+
+fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(options.json);
+    if let Some(out) = &options.out {
+        outputs::check(out, Kind::Profile, &[])?;
+    }
+    let at = options.at(glove);
+    let clock = Clock::start();
+    let (scanning, missing) = at.read(&tell, clock, interrupt)?;
+    if missing > 0 {
+        let what = format!(
+            "the glove on {} lacks sensors, and a calibration needs all 16",
+            glove.display()
+        );
+        return Err(Failure::new(what, at.doctor()).into());
+    }
+    let ids = ids(scanning.snapshot().as_ref(), &at)?;
+    let mut session = Session::new(scanning, clock, options, glove);
+    let led = session.lead(&tell, interrupt);
+    let done = session.finish();
+    let mut kept = None;
+    let decided = led.and_then(|led| match led {
+        Led::Stopped => Err(Failure::new(
+            "ended before the calibration was kept; nothing was written",
+            "the same again",
+        )
+        .into()),
+        Led::Unfinished(unfinished) => {
+            let what = format!("the calibration came to nothing: {unfinished}");
+            Err(Failure::new(
+                what,
+                at.doctor().then(" looks at the glove; then the same again"),
+            )
+            .into())
+        }
+        Led::Judged { judged, agreed } => {
+            decide(options, &judged, agreed)?;
+            let when = clock::rfc3339(SystemTime::now());
+            let profile = judged.kept(ids, when);
+            let path = match &options.out {
+                Some(path) => profile.write(path).map(|()| path.clone()),
+                None => ProfileStore::usual().and_then(|store| store.save(&profile)),
+            };
+            kept = Some(path?);
+            Ok(())
+        }
+    });
+    let next = next(glove);
+    if let (Some(judged), false) = (&done.judged, options.json) {
+        lines(judged)
+            .iter()
+            .for_each(|line| tell.say(format_args!("{line}")));
+    }
+    if let (Some(path), false) = (&kept, options.json) {
+        tell.say(format_args!("profile    {}", path.display()));
+        tell.say(format_args!("next       {next}"));
+    }
+    let (judgement, failure) = results::judged(decided);
+    if options.json {
+        results::print(
+            "calibrate",
+            calibrations::Calibrated::of(
+                glove.display().to_string(),
+                done.judged.as_ref(),
+                kept.as_deref(),
+                done.again,
+                done.took_s,
+                done.seen
+                    .as_ref()
+                    .map(gloves::Scanned::from)
+                    .unwrap_or_default(),
+                next,
+                failure,
+            ),
+        )?;
+    }
+    judgement
+}
+
+/// What one does with a calibrated glove.
+fn next(glove: &Path) -> NextStep {
+    Command::gauntlet("record")
+        .path("--glove", glove)
+        .option("--out", "my_hand.csv")
+        .then(" records the hand for `train`")
+}
+
+/// Whether it is kept. `agreed`: the person saw the verdict and wants it.
+fn decide(options: &Calibrate, judged: &Judged, agreed: bool) -> Result<()> {
+    let findings = judged.findings();
+    if judged.verdict() == Verdict::Bad && !options.keep_anyway {
+        let first = findings.iter().find(|finding| finding.verdict == "bad");
+        let (what, todo) = first.map_or(("", ""), |finding| (&finding.what, &finding.todo));
+        let others = findings.len().saturating_sub(1);
+        let others = match others {
+            0 => String::new(),
+            1 => " (and one thing more)".to_owned(),
+            _ => format!(" (and {others} things more)"),
+        };
+        let what = format!("the calibration is not good enough to be used: {what}{others}");
+        return Err(Failure::new(what, advice(todo.to_owned())).into());
+    }
+    if judged.is_swapped() && !options.as_they_sit && !agreed {
+        let names: Vec<String> = swapped(&findings);
+        let what = format!(
+            "sensors sit elsewhere than they are wired: {}",
+            names.join("; ")
+        );
+        let next = NextStep::same(Command::more().word("--as-they-sit"))
+            .then(" takes them as they sit; or put them where they belong, and calibrate again");
+        return Err(Failure::new(what, next).into());
+    }
+    Ok(())
+}
+
+/// What it came to, for a person.
+fn lines(judged: &Judged) -> Vec<String> {
+    let findings = judged.findings();
+    let hand = match judged.outcome.profile.side {
+        Side::Right => "right",
+        Side::Left => "left",
+    };
+    let quality = judged.quality();
+    let verdict = match judged.verdict() {
+        Verdict::Good => "good: every check holds",
+        Verdict::Doubtful => "usable, with doubts",
+        Verdict::Bad => "not good enough to be used",
+    };
+    let joints = judged.joints();
+    let good = joints
+        .iter()
+        .filter(|joint| joint.verdict == "good")
+        .count();
+    let mut lines = vec![
+        format!(
+            "verdict    {verdict}; {good} of {} joints good, a {hand} hand",
+            joints.len()
+        ),
+        format!(
+            "checks     moved in the turn {:.1}° (6° at most), ambiguity {:.2} (0.80), last flat pose tilted {:.1}° (9°), turned {:.1}° (4°)",
+            quality.fit_deg, quality.ratio, quality.tilt_deg, quality.heading_deg
+        ),
+    ];
+    for finding in findings {
+        lines.push(format!("{:<10} {}", finding.verdict, finding.what));
+        lines.push(format!("  try: {}", finding.todo));
+    }
+    lines
+}
+
+fn swapped(findings: &[Finding]) -> Vec<String> {
+    let sits = |finding: &&Finding| finding.what.contains(" sits on ");
+    findings
+        .iter()
+        .filter(sits)
+        .map(|finding| finding.what.clone())
+        .collect()
+}

@@ -1,0 +1,294 @@
+//! The session: scans in, words and pictures out, keys heard.
+
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use glove::calibration::{Unfinished, Verdict};
+
+use super::Calibrate;
+use crate::live::guided::GuideView;
+use crate::live::{Key, Live};
+use crate::out;
+use crate::results::calibrations::Repeated;
+use crate::tell::Tell;
+use host::calibration::guide::{News, PARTS, Remark, Stage, plan};
+use host::calibration::virtual_person::VirtualPerson;
+use host::calibration::{Guide, Judged};
+use host::clock::Clock;
+use host::failure::OrFail;
+use host::interrupt::Interrupt;
+use host::scanning::{Scanning, Snapshot};
+
+/// Pause between two looks.
+const ROUND: Duration = Duration::from_millis(20);
+/// The same remark is said again after so long.
+const SAID_EVERY: Duration = Duration::from_secs(3);
+
+/// How it ended.
+pub(super) enum Led {
+    /// With a verdict; `agreed`: the person saw it and wants it kept.
+    Judged { judged: Box<Judged>, agreed: bool },
+    /// Without an outcome.
+    Unfinished(Unfinished),
+    /// By the person.
+    Stopped,
+}
+
+/// What is left of it.
+pub(super) struct Done {
+    pub judged: Option<Judged>,
+    /// Steps that were asked for again, and why.
+    pub again: Vec<Repeated>,
+    pub took_s: f64,
+    pub seen: Option<Snapshot>,
+}
+
+/// A session under way.
+pub(super) struct Session {
+    scanning: Scanning,
+    clock: Clock,
+    guide: Guide,
+    person: Option<VirtualPerson>,
+    keep_anyway: bool,
+    json: bool,
+    again: Vec<Repeated>,
+    started: Instant,
+    said: Option<(String, Instant)>,
+}
+
+impl Session {
+    pub fn new(scanning: Scanning, clock: Clock, options: &Calibrate, glove: &Path) -> Self {
+        // What waited is of before.
+        scanning.waiting().for_each(drop);
+        scanning.begin();
+        Self {
+            scanning,
+            clock,
+            guide: Guide::new(options.declared()),
+            person: VirtualPerson::at(glove),
+            keep_anyway: options.keep_anyway,
+            json: options.json,
+            again: Vec::new(),
+            started: Instant::now(),
+            said: None,
+        }
+    }
+
+    /// Leads the person through it.
+    ///
+    /// # Errors
+    /// The terminal, or the reading of the glove, failed.
+    pub fn lead(&mut self, tell: &Tell, interrupt: &Interrupt) -> Result<Led> {
+        if self.person.is_some() {
+            tell.say(format_args!(
+                "person   a virtual one, who does what is asked"
+            ));
+        }
+        let terminal = || "the terminal does not work".to_owned();
+        let next = "the same with | cat behind it, which prints lines instead";
+        // Without a terminal there are lines, but not those of a view.
+        let drawn = !self.json && is_terminal();
+        let mut live = Live::start(!drawn).or_fail(terminal, next)?;
+        if !drawn {
+            let lasts = Guide::lasts().as_ticks() / 1_000_000;
+            tell.say(format_args!(
+                "session  {PARTS} steps, {lasts} s; Ctrl-C ends it"
+            ));
+            self.guide.go_on(self.clock.now());
+        }
+        loop {
+            self.round(tell, drawn)?;
+            if interrupt.asked() || (!self.json && out::closed()) {
+                return Ok(Led::Stopped);
+            }
+            for key in live.keys().or_fail(terminal, next)? {
+                match key {
+                    Key::End => return Ok(Led::Stopped),
+                    Key::Clutch | Key::Open if self.is_over() => {
+                        if let Some(led) = self.agreed() {
+                            return Ok(led);
+                        }
+                    }
+                    Key::Clutch | Key::Open => self.guide.go_on(self.clock.now()),
+                    Key::Again => self.guide.again(self.clock.now()),
+                    Key::Calibrate => {}
+                }
+            }
+            if self.is_over() && !drawn {
+                return Ok(self.over(false));
+            }
+            if drawn {
+                live.show(|| self.view()).or_fail(terminal, next)?;
+            }
+        }
+    }
+
+    fn is_over(&self) -> bool {
+        self.guide.ended().is_some()
+    }
+
+    fn over(&self, agreed: bool) -> Led {
+        match self.guide.ended() {
+            Some(Ok(judged)) => Led::Judged {
+                judged: Box::new(judged.clone()),
+                agreed,
+            },
+            Some(Err(unfinished)) => Led::Unfinished(*unfinished),
+            None => Led::Stopped,
+        }
+    }
+
+    /// The person wants to keep what it came to; `None` where it cannot be kept.
+    fn agreed(&self) -> Option<Led> {
+        match self.guide.ended() {
+            Some(Ok(judged)) if judged.verdict() == Verdict::Bad && !self.keep_anyway => None,
+            _ => Some(self.over(true)),
+        }
+    }
+
+    /// Takes what came, and says what happened.
+    fn round(&mut self, tell: &Tell, drawn: bool) -> Result<()> {
+        let mut scanned = self.scanning.next(ROUND);
+        while let Some(scan) = scanned {
+            self.guide.take(&scan.frame, &scan.starts);
+            scanned = self.scanning.next(Duration::ZERO);
+        }
+        if !self.scanning.running() {
+            return Err(self.scanning.ended());
+        }
+        self.guide.pass(self.clock.now());
+        while let Some(news) = self.guide.next_news() {
+            self.hear(news, tell, drawn);
+        }
+        if !drawn {
+            self.say_remarks(tell);
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, news: News, tell: &Tell, drawn: bool) {
+        match news {
+            News::Asked(step) => {
+                if let Some(person) = &self.person {
+                    person.ask(step);
+                }
+                if !drawn {
+                    let number = plan::place(step) + 1;
+                    tell.say(format_args!(
+                        "{number:>2} of {PARTS}   {}",
+                        plan::words(step)
+                    ));
+                }
+            }
+            News::Again(step, why) => {
+                self.again.push(Repeated {
+                    step: plan::name(step),
+                    why: why.to_string(),
+                });
+                if !drawn {
+                    tell.say(format_args!("           again in 3 s: {why}"));
+                }
+            }
+            News::Note(remark) => {
+                if !drawn {
+                    tell.say(format_args!("           {remark}"));
+                }
+            }
+            News::Over => {
+                if let Some(person) = &self.person {
+                    person.let_go();
+                }
+            }
+        }
+    }
+
+    fn say_remarks(&mut self, tell: &Tell) {
+        let ask = self.guide.ask(self.clock.now());
+        // While a step waits to be done again its reason was said.
+        if !matches!(ask.stage, Stage::Doing(_)) {
+            return;
+        }
+        let seen = ask.remarks.iter().rfind(|remark| !remark.is_good());
+        // What was wrong the time before was said then.
+        let Some(remark) = seen.filter(|remark| !matches!(remark, Remark::Found(_))) else {
+            return;
+        };
+        // Numbers change all the time.
+        let text = remark.to_string();
+        let kind: String = text.chars().filter(|c| !c.is_ascii_digit()).collect();
+        let old = |(said, at): &(String, Instant)| *said == kind && at.elapsed() < SAID_EVERY;
+        if !self.said.as_ref().is_some_and(old) {
+            tell.say(format_args!("           {text}"));
+            self.said = Some((kind, Instant::now()));
+        }
+    }
+
+    fn view(&self) -> GuideView {
+        let seen = self.scanning.snapshot();
+        let glove = seen.map_or_else(String::new, |seen| {
+            format!(
+                "{} of 16 sensors, {:.1} scans/s, {} baud",
+                seen.good(),
+                seen.rate,
+                seen.baud
+            )
+        });
+        let (end, good, keys) = self.end();
+        GuideView {
+            elapsed: self.started.elapsed(),
+            ask: self.guide.ask(self.clock.now()),
+            glove,
+            end,
+            good,
+            keys,
+        }
+    }
+
+    /// What it came to, whether that is good, and what keys do.
+    fn end(&self) -> (Vec<String>, bool, String) {
+        let Some(ended) = self.guide.ended() else {
+            let keys = "space: begin, or do not wait   r: this step again   q: end";
+            return (Vec::new(), false, keys.to_owned());
+        };
+        let judged = match ended {
+            Ok(judged) => judged,
+            Err(unfinished) => {
+                let lines = vec![format!("it came to nothing: {unfinished}")];
+                return (lines, false, "r: all of it again   q: end".to_owned());
+            }
+        };
+        let bad = judged.verdict() == Verdict::Bad;
+        let mut keys = Vec::new();
+        if !bad || self.keep_anyway {
+            keys.push(match judged.is_swapped() {
+                true => "space: keep it, the sensors as they sit".to_owned(),
+                false => "space: keep it".to_owned(),
+            });
+        }
+        let again = judged
+            .again()
+            .map_or("the last flat pose", |again| again.words());
+        keys.push(format!("r: {again} again"));
+        keys.push("q: end without keeping it".to_owned());
+        (super::lines(judged), !bad, keys.join("   "))
+    }
+
+    /// Ends the reading.
+    pub fn finish(mut self) -> Done {
+        let seen = self.scanning.snapshot();
+        // What ended it before was told.
+        let _ = self.scanning.stop();
+        Done {
+            judged: self.guide.ended().and_then(|ended| ended.clone().ok()),
+            again: self.again,
+            took_s: self.started.elapsed().as_secs_f64(),
+            seen,
+        }
+    }
+}
+
+fn is_terminal() -> bool {
+    use std::io::IsTerminal;
+    std::io::stdin().is_terminal() && std::io::stdout().is_terminal()
+}
