@@ -2,16 +2,21 @@
 
 mod common;
 
+use bridge::calibration::{Refusal as NotTaken, Try};
 use bridge::protocol::message::{
-    Answer, CHUNK, Call, Devices, FromBridge, Refusal, SlotContents, UnusedSensor, VERSION,
-    WeightsKind,
+    Answer, CHUNK, Call, Devices, FromBridge, Refusal, SensorIds, SlotContents, UnusedSensor,
+    VERSION, WeightsKind,
 };
 use bridge::protocol::{Outcome, frame};
 use bridge::{Settings, State, store};
 use common::bench::{Bench, MS, S};
 use common::host::{Host, crc32, framed};
-use common::{hand_image, hand_image_int16};
+use common::worn::Wearer;
+use common::{Flash, hand_image, hand_image_int16};
+use glove::calibration::Bound;
 use glove::scan::Health;
+use rig::flash::Power;
+use rig::person::Task;
 
 fn without_weights() -> Host {
     Host::new(Bench::with(
@@ -369,4 +374,129 @@ fn every_single_bit_error_in_a_request_is_refused_by_the_frame() {
         host.run(20 * MS);
         assert_eq!(host.hear(), None, "bit {bit}");
     }
+}
+
+/// A host at a bridge with an honest glove on a hand that lies flat, and a place for its profile.
+fn wearing(wearer: &Wearer) -> Host {
+    let (mut bench, _) = wearer.bench(&[(Task::Flat, 0.0)]);
+    let power = Power::new();
+    bench
+        .app
+        .keep_profile([Flash::new(64 * 1024, &power), Flash::new(64 * 1024, &power)]);
+    bench.run(3 * S);
+    Host::new(bench).hello()
+}
+
+fn give(host: &mut Host, profile: &Bound) -> Result<Answer, Refusal> {
+    let bytes = profile.to_bytes();
+    for (index, chunk) in bytes.chunks(CHUNK).enumerate() {
+        let offset = (CHUNK * index) as u32;
+        let there = offset + chunk.len() as u32;
+        let answer = host.ask(Call::ProfileChunk {
+            offset,
+            bytes: chunk,
+        });
+        assert_eq!(answer, Ok(Answer::Received { bytes: there }));
+    }
+    host.ask(Call::ProfileCommit {
+        length: bytes.len() as u32,
+        crc: crc32(&bytes),
+    })
+}
+
+/// A flat pose over the line: calibrated then, or why not.
+fn flat_pose(host: &mut Host) -> Try {
+    assert_eq!(host.ask(Call::CalibrateFlatHand), Ok(Answer::Done));
+    loop {
+        host.run(100 * MS);
+        let Ok(Answer::Health(health)) = host.ask(Call::Health) else {
+            panic!("no answer")
+        };
+        if health.calibration.newest != Try::Waiting {
+            return health.calibration.newest;
+        }
+    }
+}
+
+#[test]
+fn a_profile_over_the_line_is_kept_read_back_and_calibrated_by_a_flat_pose() {
+    let wearer = Wearer::new(1);
+    let profile = wearer.profile();
+    let mut host = wearing(&wearer);
+    let none = Refusal::Profile(store::profile::Error::NoProfile);
+    assert_eq!(host.ask(Call::ProfileGet { offset: 0 }), Err(none));
+    assert_eq!(flat_pose(&mut host), Try::Refused(NotTaken::NoProfile));
+    assert_eq!(
+        host.ask(Call::SensorIds),
+        Ok(Answer::SensorIds(SensorIds(profile.ids.map(Some))))
+    );
+    assert_eq!(give(&mut host, &profile), Ok(Answer::Done));
+    let mut back = Vec::new();
+    while back.len() < Bound::BYTES {
+        let offset = back.len() as u32;
+        match host.ask(Call::ProfileGet { offset }) {
+            Ok(Answer::Profile(part)) => back.extend_from_slice(&part.bytes),
+            other => panic!("{other:?}"),
+        }
+    }
+    assert_eq!(Bound::from_bytes(&back), Ok(profile));
+    host.run(100 * MS);
+    assert_eq!(flat_pose(&mut host), Try::Taken);
+    let Ok(Answer::Headings(headings)) = host.ask(Call::Headings) else {
+        panic!("no answer")
+    };
+    assert!(headings.profile.is_there && headings.profile.fits);
+    assert_eq!((headings.unknown, headings.poses), (0, 1));
+    assert!(headings.pose.is_some());
+    host.ask(Call::Engage).expect("taken");
+    assert_eq!(give_refused(&mut host, &profile), Err(Refusal::Engaged));
+    assert_eq!(host.ask(Call::ProfileErase), Err(Refusal::Engaged));
+    host.ask(Call::Release).expect("obeyed");
+    host.run(100 * MS);
+    assert_eq!(host.ask(Call::ProfileErase), Ok(Answer::Done));
+    assert_eq!(host.ask(Call::ProfileGet { offset: 0 }), Err(none));
+    assert_eq!(flat_pose(&mut host), Try::Refused(NotTaken::NoProfile));
+}
+
+fn give_refused(host: &mut Host, profile: &Bound) -> Result<Answer, Refusal> {
+    host.ask(Call::ProfileChunk {
+        offset: 0,
+        bytes: &profile.to_bytes()[..100],
+    })
+}
+
+#[test]
+fn scans_over_the_line_are_the_sensors_by_wire_and_end_with_the_session() {
+    let mut wearer = Wearer::new(1);
+    wearer.honest.seats.swap(8, 11);
+    let profile = wearer.profile();
+    let mut host = wearing(&wearer);
+    assert_eq!(give(&mut host, &profile), Ok(Answer::Done));
+    host.ask(Call::Scans { on: true }).expect("on");
+    let (mut scans, begun) = (Vec::new(), host.bench.now());
+    while host.bench.now() < begun + S {
+        host.turn();
+        if let Some(FromBridge::Scan(scan)) = host.hear() {
+            scans.push(scan);
+        }
+    }
+    assert!((33..40).contains(&scans.len()), "{}", scans.len());
+    for pair in scans.windows(2) {
+        assert_eq!(pair[1].sequence, pair[0].sequence + 1);
+        assert_eq!(pair[1].good, 0xFFFF);
+    }
+    let newest = scans.last().expect("some").frame();
+    for k in 0..16 {
+        let at = newest.samples[k].stamp;
+        let truth = host.bench.glove.true_orientation(k, at);
+        let q = newest.samples[k].orientation;
+        let dot = q.w * truth[0] + q.i * truth[1] + q.j * truth[2] + q.k * truth[3];
+        let off = 2.0 * dot.abs().min(1.0).acos().to_degrees();
+        assert!(off < 2.0, "sensor {k} is {off}° off");
+    }
+    assert!(newest.samples[15].stamp.as_ticks() - newest.samples[0].stamp.as_ticks() > 20_000);
+    host.run(2_500 * MS);
+    while host.hear().is_some() {}
+    host.run(S);
+    assert!(host.hear().is_none(), "nobody asks any more");
 }

@@ -86,8 +86,24 @@ fn call(kind: u8, value: u32, bytes: &[u8]) -> Call<'_> {
             period_ms: value as u16,
         },
         14 => Call::Health,
-        _ if value % 2 == 1 => Call::Devices,
-        _ => Call::CalibrateUndo,
+        _ => match value % 9 {
+            0 => Call::CalibrateStraight,
+            1 => Call::ProfileChunk {
+                offset: value % 2_048,
+                bytes,
+            },
+            2 => Call::ProfileCommit {
+                length: 748,
+                crc: value,
+            },
+            3 => Call::ProfileErase,
+            4 => Call::ProfileGet { offset: value },
+            5 => Call::Scans { on: true },
+            6 => Call::SensorIds,
+            7 => Call::Headings,
+            _ if value % 2 == 1 => Call::Devices,
+            _ => Call::CalibrateUndo,
+        },
     }
 }
 
