@@ -7,11 +7,11 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
+use glove::hand::Side;
 use rig::Device;
-use rig::glove::{Honest, VirtualGlove};
+use rig::glove::VirtualGlove;
 use rig::gripper::tcp::TcpHandle;
 use rig::gripper::{Family, VirtualGripper};
-use rig::person::Traits;
 use rig::pty::{Handle, PtyDevice};
 
 use crate::flat_hand::Hand;
@@ -20,6 +20,8 @@ use crate::options::model_parser;
 use crate::played;
 use crate::progress::Person;
 use crate::say;
+use crate::wearer::Wearer;
+use host::calibration::ProfileStore;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
@@ -45,17 +47,22 @@ Examples:
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
-  gauntlet simulate --honest 7                                       sensors as they really are; in another terminal:
+  gauntlet simulate --seed 7 --left --swap 8,11                      another person, a left hand, two sensors exchanged
+
+and, once `ready` is there, in another terminal:
+  gauntlet glove watch --glove /tmp/glove
   gauntlet calibrate --glove /tmp/glove
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
 ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
 takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
-The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
+The glove's sensors are as real ones: powered on at 9600 baud (and set to 115200 before `ready`), sewn on any way, each with a \
+heading of its own that drifts, noise, flipped bits. Its virtual person is calibrated on a clock of its own before that, and the \
+profile written where `teleop` finds it by the sensors' ids. The person does by itself what other verbs ask for at this path. \
+The hand lies flat for 3 s when the glove's port is opened, then it moves; \
 Enter lays it flat at any time, and Enter again lets it move. \
-With --honest its sensors are as real ones: sewn on any way, each with a heading of its own that drifts, noise, flipped bits. \
-Its person does by itself what `gauntlet calibrate --glove PATH` asks for. \
+With --ideal the sensors sit straight and share a heading, as no real ones do: `teleop` takes them with --ideal, too. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -70,17 +77,17 @@ pub struct Simulate {
     /// The glove plays this recording of a hand instead of generated motion.
     #[arg(long, value_name = "FILE.csv")]
     pub poses: Option<PathBuf>,
-    /// Seed of the generated motion.
+    /// Seed of the generated motion, the virtual person and the glove.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// A virtual person with sensors as they really are, from this seed, instead of a hand whose sensors sit straight.
-    #[arg(long, value_name = "SEED", conflicts_with = "poses")]
-    pub honest: Option<u64>,
-    /// The virtual person's glove is a left one.
-    #[arg(long, requires = "honest")]
+    /// Sensors that sit straight and share one heading, as no real ones do.
+    #[arg(long)]
+    pub ideal: bool,
+    /// The glove is a left one.
+    #[arg(long, conflicts_with = "ideal")]
     pub left: bool,
-    /// Two sensors of it, as they are wired, are swapped: 8,11.
-    #[arg(long, value_name = "A,B", requires = "honest", value_parser = swapped)]
+    /// Two of its sensors, as they are wired, sit on each other's segment: 8,11.
+    #[arg(long, value_name = "A,B", conflicts_with = "ideal", value_parser = swapped)]
     pub swap: Option<(usize, usize)>,
 }
 
@@ -101,17 +108,31 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     let [glove_place, gripper_place] = places(options)?;
     let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
     let motion = Motion::open(options.poses.as_deref(), options.seed, &Person)?;
+    let wearer = (!options.ideal).then(|| Wearer {
+        side: if options.left {
+            Side::Left
+        } else {
+            Side::Right
+        },
+        swapped: options.swap,
+        ..Wearer::new(options.seed)
+    });
     let glove = glove_place
-        .map(|path| Glove::start(&motion, options, path))
+        .map(|path| Glove::start(&motion, wearer.as_ref(), path))
         .transpose()?;
     if let Some(glove) = &glove {
         let place = glove.handle.path().display();
-        match options.honest {
-            Some(seed) => say!(
-                "glove    {place}  {BAUD} baud, honest sensors and a virtual person (seed {seed})"
-            ),
-            None => say!("glove    {place}  {BAUD} baud, {}", motion.describe()),
-        }
+        let sensors = match wearer {
+            Some(_) => format!("a virtual person (seed {})", options.seed),
+            None => "ideal sensors".to_owned(),
+        };
+        say!(
+            "glove    {place}  {BAUD} baud, {sensors}, {}",
+            motion.describe()
+        );
+    }
+    if let (Some(wearer), Some(_)) = (&wearer, &glove) {
+        keep_profile(wearer, interrupt)?;
     }
     let gripper = gripper_place
         .map(|place| Simulated::start(place, model))
@@ -170,16 +191,16 @@ struct Glove {
 
 impl Glove {
     /// Makes one that `link` leads to.
-    fn start(motion: &Motion, options: &Simulate, link: &Path) -> Result<Self> {
-        let device = match options.honest {
-            Some(seed) => honest(seed, options),
+    fn start(motion: &Motion, wearer: Option<&Wearer>, link: &Path) -> Result<Self> {
+        let device = match wearer {
+            Some(wearer) => wearer.playing(played::source(motion)),
             None => {
                 let config = rig::glove::Config::at_baud(BAUD);
                 VirtualGlove::new(played::virtual_hand(motion), config)
             }
         };
         let handle = spawn(Box::new(device.clone()), link)?;
-        let ear = options.honest.map(|_| Ear::of(&device, link)).transpose()?;
+        let ear = wearer.map(|_| Ear::of(&device, link)).transpose()?;
         Ok(Self {
             device,
             handle,
@@ -194,30 +215,23 @@ impl Glove {
     }
 }
 
-/// A glove as it really is, on a virtual person.
-fn honest(seed: u64, options: &Simulate) -> VirtualGlove {
-    let mut honest = Honest {
-        seed,
-        ..Honest::default()
-    };
-    if let Some((a, b)) = options.swap {
-        honest.seats.swap(a, b);
+/// Calibrates the virtual person, and writes the profile where other verbs find it. Where that cannot be written the devices are of use
+/// all the same.
+fn keep_profile(wearer: &Wearer, interrupt: &Interrupt) -> Result<()> {
+    let done = wearer.calibrated(interrupt)?;
+    let saved = ProfileStore::usual().and_then(|store| store.save(&done.kept));
+    match saved {
+        Ok(path) => say!(
+            "profile  {}  of its person: {}",
+            path.display(),
+            done.line()
+        ),
+        Err(failure) => {
+            say!("warning: the virtual person's profile is not kept: {failure}");
+            say!("  try: {}", failure.next_step());
+        }
     }
-    let config = rig::glove::Config {
-        side: if options.left {
-            rig::glove::Side::Left
-        } else {
-            rig::glove::Side::Right
-        },
-        honest: Some(honest),
-        ..rig::glove::Config::at_baud(BAUD)
-    };
-    let person = rig::person::Person::new(Traits {
-        seed,
-        is_left: options.left,
-        ..Traits::default()
-    });
-    VirtualGlove::new(Box::new(person), config)
+    Ok(())
 }
 
 /// A virtual gripper and the way to it.
@@ -305,7 +319,7 @@ mod tests {
             gripper_model: None,
             poses: None,
             seed: 1,
-            honest: None,
+            ideal: false,
             left: false,
             swap: None,
         }

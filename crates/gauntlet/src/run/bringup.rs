@@ -4,9 +4,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::calibration::Try;
+use glove::calibration::Step;
 
 use super::Run;
 use crate::tell::Tell;
+use crate::wearer::Listener;
 use gripper::Activation;
 use host::failure::Failure;
 use host::session::{Order, Snapshot, kept, refused};
@@ -31,11 +33,16 @@ impl Run {
     /// # Errors
     /// What ended the bridge, or why the hand was not taken.
     pub fn calibrate(&mut self, tell: &Tell) -> Result<bool> {
-        let ended = |run: &Self| {
-            let seen = run.snapshot();
-            seen.map_or(0, |seen| seen.calibration.ended)
-        };
-        let before = ended(self);
+        self.person
+            .iter()
+            .for_each(|person| person.ask(Step::FirstFlat));
+        let taken = self.take_flat(tell);
+        self.person.iter().for_each(Listener::let_go);
+        taken
+    }
+
+    fn take_flat(&mut self, tell: &Tell) -> Result<bool> {
+        let before = self.ended();
         let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
         self.order(self.flat(wait))?;
         tell.say(format_args!("{ASK}"));

@@ -1,11 +1,14 @@
 //! A person lays the hand flat.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use glove::calibration::Step;
 
 use crate::run::{ASK_FLAT, FLAT_WAIT};
 use crate::tell::Tell;
+use host::calibration::virtual_person::VirtualPerson;
 use host::clock::{Clock, ticks};
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -21,6 +24,22 @@ const SAID_EVERY: Duration = Duration::from_secs(3);
 /// # Errors
 /// Why the hand was not taken; what ended the reading.
 pub(in crate::commands) fn take_flat(
+    glove: &Path,
+    hand: &mut Hand,
+    scanning: &mut Scanning,
+    clock: Clock,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<bool> {
+    // A virtual one does it by itself.
+    let person = VirtualPerson::at(glove);
+    person.iter().for_each(|person| person.ask(Step::FirstFlat));
+    let taken = wait_for_flat(hand, scanning, clock, tell, interrupt);
+    person.iter().for_each(VirtualPerson::let_go);
+    taken
+}
+
+fn wait_for_flat(
     hand: &mut Hand,
     scanning: &mut Scanning,
     clock: Clock,
