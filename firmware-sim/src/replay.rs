@@ -339,10 +339,17 @@ pub fn scanner<'s, 't>(tape: &'s Tape<'t>) -> glove::scan::Scanner<Port<'s, 't>>
     glove::scan::Scanner::new(Port::new(tape, GLOVE), glove::scan::Config::default())
 }
 
-/// Replays a whole trace; the bytes put out, or `None` when they found no room.
-pub fn run<F: Slot>(trace: &[u8], room: &mut [u8], slots: [F; 2]) -> Option<usize> {
+/// Replays a whole trace with these slots for weights and for the glove's profile; the bytes put out, or `None` when they found no
+/// room.
+pub fn run<F: Slot>(
+    trace: &[u8],
+    room: &mut [u8],
+    slots: [F; 2],
+    profile: [F; 2],
+) -> Option<usize> {
     let tape = Tape::new(trace, room);
     let mut replay = Replay::new(&tape, slots, |gripper| gripper);
+    replay.app.keep_profile(profile);
     while !replay.is_over() {
         let due = replay.app.step();
         if replay.rest(due) == Outcome::Reboot {

@@ -23,3 +23,7 @@ pub fn random(seed: u64) -> u64 {
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
     z ^ (z >> 31)
 }
+
+/// An honest virtual glove on a virtual person's hand, and the profile of it.
+#[path = "../../crates/bridge/tests/common/wearer.rs"]
+pub mod wearer;

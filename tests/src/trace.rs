@@ -10,19 +10,24 @@ use crate::nor_slot::NorSlot;
 use bridge::protocol::message::{CHUNK, Call, Request, VERSION};
 use bridge::protocol::{Outcome, Server, frame};
 use bridge::{App, Board, Config, Instant, Platform, State, WeightsStore};
+use crc::{CRC_32_ISO_HDLC, Crc};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
+use glove::calibration::Bound;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
 use rig::faulty::{Faults, Faulty};
 use rig::flash::Nor;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
+use rig::person::{Attitude, Person, Task};
 use rig::{Clock, MemoryWire};
 
 use crate::bits::Pose;
 use crate::images;
 use crate::replay::{AXES, GLOVE, GRIPPER, HOST, Record};
+use crate::wearer::Wearer;
 
+const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 const BAUD: u32 = 115_200;
 const SESSION: u32 = 7;
 /// Time between two requests of the host, µs: what a chunk takes on the line, and its reply.
@@ -63,6 +68,21 @@ pub fn short(seed: u64, faulty: bool) -> Recorded {
     record(&images::gentle(seed), hand, 5, faulty, seed)
 }
 
+/// Five seconds of a person in an honest glove with its profile, calibrated by a flat pose.
+///
+/// # Panics
+/// Where the person was not calibrated.
+pub fn worn(seed: u64) -> Recorded {
+    let wearer = Wearer::new(seed);
+    let mut person = Person::new(wearer.traits.clone());
+    person.ask(Task::Flat, 0.0);
+    person.ask(Task::Use(Attitude::Free), CALIBRATED as f64 * 1e-6);
+    let profile = wearer.profile();
+    let image = images::gentle(seed);
+    let host = Host::new(&image, Some(&profile), 5);
+    recorded(wearer.glove(person), host, 5, false, seed)
+}
+
 /// Records `seconds` of a moving hand under a closed clutch, after flashing `image` (nothing, when it is empty). `faulty`: bytes of all lines are lost
 /// and changed now and then. `hand` gives the pose at a time in seconds; the same `seed` gives the same trace.
 pub fn record(
@@ -72,14 +92,25 @@ pub fn record(
     faulty: bool,
     seed: u64,
 ) -> Recorded {
-    let clock = Clock::new();
-    let log = Log::default();
     // Flat until the glove is calibrated, then into the motion within a second.
     let shown = move |time_s: f64| {
         let share = (time_s - CALIBRATED as f64 * 1e-6).clamp(0.0, 1.0) as f32;
         hand(time_s).map(|angle| angle * share)
     };
     let glove = VirtualGlove::new(Box::new(shown), rig::glove::Config::at_baud(BAUD));
+    let host = Host::new(image, None, seconds);
+    recorded(glove, host, seconds, faulty, seed)
+}
+
+fn recorded(
+    glove: VirtualGlove,
+    mut host: Host<'_>,
+    seconds: u64,
+    faulty: bool,
+    seed: u64,
+) -> Recorded {
+    let clock = Clock::new();
+    let log = Log::default();
     let gripper = VirtualGripper::new(rig::gripper::Config::default());
     let faults = faults(faulty);
     let tap = |wire: MemoryWire, port: u8| Tap {
@@ -103,6 +134,7 @@ pub fn record(
         WeightsStore::new(slots(), bridge::app::expected(AXES)),
         Config::default(),
     );
+    app.keep_profile(slots());
     let line = HostLine::default();
     let mut server = Server::new(Tap {
         inner: line.clone(),
@@ -110,7 +142,6 @@ pub fn record(
         clock: clock.clone(),
         log: log.clone(),
     });
-    let mut host = Host::new(image, seconds);
     let end = ACTIVE + seconds * 1_000_000 + 500_000;
     while clock.now().as_ticks() < end {
         host.speak(clock.now().as_ticks(), &line);
@@ -267,6 +298,9 @@ impl Write for HostLine {
 /// What the host says and when.
 struct Host<'i> {
     image: &'i [u8],
+    /// The glove's profile, if it has one.
+    profile: Vec<u8>,
+    profile_offset: usize,
     sequence: u16,
     offset: usize,
     due: u64,
@@ -281,9 +315,11 @@ struct Host<'i> {
 }
 
 impl<'i> Host<'i> {
-    fn new(image: &'i [u8], seconds: u64) -> Self {
+    fn new(image: &'i [u8], profile: Option<&Bound>, seconds: u64) -> Self {
         Self {
             image,
+            profile: profile.map_or_else(Vec::new, |profile| profile.to_bytes().to_vec()),
+            profile_offset: 0,
             sequence: 0,
             offset: 0,
             due: 0,
@@ -322,13 +358,32 @@ impl<'i> Host<'i> {
         } else if self.offset == image.len() && !image.is_empty() {
             self.offset += 1;
             self.say(line, Call::WeightsCommit);
+        } else if self.profile_offset < self.profile.len() {
+            let from = self.profile_offset;
+            let bytes = self.profile[from..].to_vec();
+            let bytes = &bytes[..bytes.len().min(CHUNK)];
+            self.profile_offset = from + bytes.len();
+            let offset = from as u32;
+            self.say(line, Call::ProfileChunk { offset, bytes });
+        } else if self.profile_offset == self.profile.len() && !self.profile.is_empty() {
+            self.profile_offset += 1;
+            let call = Call::ProfileCommit {
+                length: self.profile.len() as u32,
+                crc: CRC32.checksum(&self.profile),
+            };
+            self.say(line, call);
         } else if !self.activated && now >= UP {
             self.activated = true;
             self.say(line, Call::Activate);
         } else if now >= self.calibrate && now < CALIBRATED - CALIBRATE_EVERY {
             // More than once: on a line with faults a request may be lost, and a second with a lost sensor is refused.
             self.calibrate = now + CALIBRATE_EVERY;
-            self.say(line, Call::CalibrateStraight);
+            let call = if self.profile.is_empty() {
+                Call::CalibrateStraight
+            } else {
+                Call::CalibrateFlatHand
+            };
+            self.say(line, call);
         } else if now < ACTIVE {
             // A line that is not clean: what is no frame is counted and passed over.
             line.0.borrow_mut().extend([0x55, 0x00, 0x13]);

@@ -8,7 +8,7 @@ use loop_tests::chip::{self, bench};
 use loop_tests::emulated::alone;
 use loop_tests::images::{self, SHAPE};
 use loop_tests::replay::{self, GLOVE, GRIPPER, HOST, Record, VALUES, records};
-use loop_tests::trace::{short, slots};
+use loop_tests::trace::{short, slots, worn};
 
 const SEED: u64 = 1;
 
@@ -28,7 +28,7 @@ fn the_map_gives_the_same_bits_here_and_on_the_chip() {
 
 fn replayed_here(trace: &[u8]) -> Vec<u8> {
     let mut room = vec![0; 5 << 20];
-    let length = replay::run(trace, &mut room, slots()).expect("room");
+    let length = replay::run(trace, &mut room, slots(), slots()).expect("room");
     room.truncate(length);
     room
 }
@@ -80,4 +80,24 @@ fn a_stored_trace_gives_the_same_commands_here_and_on_the_chip() {
         );
         assert!(records(&here).filter(is_motion).count() > 500);
     }
+}
+
+#[test]
+fn an_honest_glove_with_its_profile_gives_the_same_bits_here_and_on_the_chip() {
+    let recorded = worn(SEED);
+    assert!(recorded.following_frames > 100, "{recorded:?}");
+    let here = replayed_here(&recorded.trace);
+    assert!(records(&here).filter(is_motion).count() > 500);
+    let Some(bench) = bench() else { return };
+    let _alone = alone();
+    let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false).expect("an output");
+    for (number, (here, chip)) in records(&here).zip(records(&chip)).enumerate() {
+        assert_eq!(here, chip, "record {number}");
+    }
+    assert!(here == chip, "one output goes on after the other's end");
+    println!(
+        "{} bytes in, {:?} writes and frames: all the same",
+        recorded.trace.len(),
+        sorts(&here)
+    );
 }

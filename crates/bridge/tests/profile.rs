@@ -6,7 +6,7 @@ use bridge::calibration::{Lack, Refusal, Try};
 use bridge::event::Kind;
 use bridge::{HoldReason, State};
 use common::bench::{Bench, MS, S};
-use common::worn::Wearer;
+use common::wearer::Wearer;
 use glove::calibration::Misfit;
 use glove::hand::SEGMENT_COUNT;
 use rig::person::{Attitude, Person, Task};

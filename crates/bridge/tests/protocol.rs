@@ -11,7 +11,7 @@ use bridge::protocol::{Outcome, frame};
 use bridge::{Settings, State, store};
 use common::bench::{Bench, MS, S};
 use common::host::{Host, crc32, framed};
-use common::worn::Wearer;
+use common::wearer::Wearer;
 use common::{Flash, hand_image, hand_image_int16};
 use glove::calibration::Bound;
 use glove::scan::Health;

@@ -164,7 +164,8 @@ fn recorded_or_moving() -> impl Fn(f64) -> bits::Pose + Send {
 
 fn replayed(trace: &[u8]) -> Result<Vec<u8>, String> {
     let mut room = vec![0; 6 << 20];
-    let length = replay::run(trace, &mut room, trace::slots()).ok_or("no room for the output")?;
+    let length = replay::run(trace, &mut room, trace::slots(), trace::slots())
+        .ok_or("no room for the output")?;
     room.truncate(length);
     Ok(room)
 }

@@ -4,6 +4,7 @@
 pub mod bench;
 pub mod fuzz;
 pub mod host;
+pub mod wearer;
 pub mod worn;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};

@@ -166,7 +166,11 @@ impl GloveView {
         let with_table = area.width >= TABLE && fit(self.fingers.len());
         let mut lines = vec![heading(&self.heading())];
         if !self.calibrated {
-            lines[0].push_span(Span::styled(" NOT CALIBRATED", Style::new().fg(Color::Red)));
+            // Before the title, which a narrow terminal cuts off.
+            let red = Style::new().fg(Color::Red);
+            lines[0]
+                .spans
+                .insert(1, Span::styled(" NOT CALIBRATED", red));
         }
         match with_table {
             true => lines.extend(hand_table(&self.fingers, self.live(), area.width)),

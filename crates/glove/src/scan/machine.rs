@@ -297,8 +297,9 @@ impl<B: Bus> BusScanner<B> {
                     return false;
                 }
                 self.step = None;
+                let relative = self.config.imu.mode == imu::Mode::Imu;
                 if let Some(sensor) = self.sensors.get_mut(k)
-                    && sensor.step_done(step, outcome, now)
+                    && sensor.step_done(step, outcome, relative, now)
                     && let Some(starts) = self.counters.starts.get_mut(k)
                 {
                     *starts = starts.wrapping_add(1);

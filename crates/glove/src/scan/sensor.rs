@@ -343,8 +343,15 @@ impl Sensor {
         self.raw = None;
     }
 
-    /// A step of its bring-up ended well; true when the sensor is up after a real start.
-    pub fn step_done(&mut self, step: Step, outcome: Outcome, now: Instant) -> bool {
+    /// A step of its bring-up ended well; true when the sensor is up after a real start. `relative`: its heading is another then, so
+    /// that where it was says nothing of where it is.
+    pub fn step_done(
+        &mut self,
+        step: Step,
+        outcome: Outcome,
+        relative: bool,
+        now: Instant,
+    ) -> bool {
         self.tries = 0;
         self.forget();
         self.due = after(now, outcome.pause);
@@ -362,6 +369,9 @@ impl Sensor {
             return false;
         }
         (self.fresh, self.suspect) = (false, None);
+        if relative {
+            self.good = None;
+        }
         self.up_since = now;
         self.health = Health::Starting;
         true

@@ -2,6 +2,7 @@
 
 mod bridge_chip;
 mod bridge_line;
+mod own;
 mod sensors;
 
 use std::path::Path;

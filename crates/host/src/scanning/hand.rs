@@ -179,7 +179,12 @@ impl Hand {
     fn follow(&mut self, progress: Progress, at: glove::Instant) {
         match progress {
             Progress::Waiting { obstacle, .. } => {
-                self.flat = Flat::Waiting(obstacle.map(|why| why.to_string()));
+                // What stood in the way last is said until something else does.
+                let before = match std::mem::take(&mut self.flat) {
+                    Flat::Waiting(before) => before,
+                    _ => None,
+                };
+                self.flat = Flat::Waiting(obstacle.map(|why| why.to_string()).or(before));
             }
             Progress::Refused(why) => self.refuse(why.to_string(), at),
             Progress::Done(_) => {}
@@ -292,7 +297,9 @@ mod tests {
 
     #[test]
     fn without_a_flat_pose_no_joint_is_measured_and_with_one_all_are() {
-        let straight = [Quaternion::identity(); SEGMENT_COUNT];
+        // Palm down: the segment's y is the world's up.
+        let down = Quaternion::from_euler_angles(std::f32::consts::FRAC_PI_2, 0.0, 0.0);
+        let straight = [down; SEGMENT_COUNT];
         for mut hand in [Hand::ideal(Side::Right), Hand::with_profile(&bound())] {
             let flat = |_| [0.0; JOINT_COUNT];
             let before = scans(&mut hand, 0, 10, &straight, [1; 16], flat);

@@ -98,6 +98,10 @@ pub fn all(memory: Memory) -> Option<usize> {
     let [sample, angles] = scanned(trace, scratch)?;
     tell("imu_sample", sample)?;
     tell("hand_angles", angles)?;
+    let [mean, most, pose] = worn(trace, scratch)?;
+    tell("headings_and_angles_mean", mean)?;
+    tell("headings_and_angles", most)?;
+    tell("flat_pose", pose)?;
     let length = text.length;
     // To where the host looks for it.
     let (scratch, room) = output.split_at_mut_checked(5 << 20)?;
@@ -269,4 +273,48 @@ fn scanned(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 2]> {
         machine.wait_until(scanner.next_due().unwrap_or(now));
     }
     (angles.times > 0).then_some([sample, angles])
+}
+
+/// Frames of a flat hand from which a pose is taken.
+const POSE_FRAMES: u32 = 40;
+
+/// The same frames with a profile: alignment, headings, angles and what is beyond a hand, in the mean and at most; and what takes a
+/// flat pose.
+fn worn(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 3]> {
+    let tape = Tape::new(trace, scratch);
+    let mut machine = Machine::new(&tape);
+    let mut scanner = scanner(&tape);
+    let mut posture = Posture::new(glove::hand::Side::Right, None);
+    let [mut mean, mut most, mut pose] = [Most::default(); 3];
+    let (mut frames, mut sum) = (0, 0u64);
+    while !tape.is_over() {
+        let now = machine.now();
+        if let Some(frame) = scanner.poll(now) {
+            if frames == 0 {
+                let profile = glove::calibration::Bound {
+                    profile: glove::calibration::Profile::straight(glove::hand::Side::Right),
+                    ids: scanner.ids().map(Option::unwrap_or_default),
+                };
+                posture.set_profile(Some(&profile));
+                posture.meet(&scanner.ids());
+                posture.hear(&scanner.counters().starts, true, now);
+                posture.begin_pose();
+            }
+            frames += 1;
+            let (instructions, reading) = count(|| posture.read(black_box(&frame)));
+            if black_box(reading).is_ok() {
+                most.see(instructions);
+                sum += u64::from(instructions);
+            }
+            if frames == POSE_FRAMES {
+                let (instructions, ended) = count(|| posture.end_pose(now));
+                ended.ok()?;
+                pose.see(instructions);
+            }
+        }
+        machine.wait_until(scanner.next_due().unwrap_or(now));
+    }
+    mean.times = most.times;
+    mean.instructions = sum.checked_div(u64::from(most.times))? as u32;
+    Some([mean, most, pose])
 }

@@ -69,7 +69,8 @@ fn bits(memory: Memory) -> Option<usize> {
 }
 
 fn replayed(memory: Memory) -> Option<usize> {
-    replay::run(memory.first, memory.output, flash::slots())
+    let (slots, profile) = (flash::slots(), flash::profile_slots());
+    replay::run(memory.first, memory.output, slots, profile)
 }
 
 /// No interrupt is ever enabled.

@@ -8,6 +8,7 @@ use glove::imu;
 use glove::scan::{Config, Health, Scanner, State};
 
 use super::bridge_chip::RESET_BAUD;
+use super::own;
 use crate::clock::Clock;
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;
@@ -22,6 +23,8 @@ const BRING_UP_SLOW: Duration = Duration::from_secs(20);
 const STUBBORN: Duration = Duration::from_secs(12);
 /// Time for a sensor to come after the first frame.
 const STRAGGLERS: Duration = Duration::from_secs(2);
+/// For the noise and the drift of the sensors' headings: to about 1 °/min.
+const LYING: Duration = Duration::from_secs(3);
 /// The longest wait between two looks.
 const LOOK: glove::Duration = glove::Duration::from_millis(1);
 
@@ -92,6 +95,35 @@ pub fn sensors(port: Port, baud: u32, mux: u8, findings: &mut Findings, interrup
     for (k, seen) in seen.iter().enumerate() {
         unsteady(k, seen, findings);
     }
+    if lasting.iter().all(|health| health.is_good()) {
+        let lying = watch_lying(&mut scanner, &mut pc, interrupt);
+        let ids = scanner.ids();
+        own::tell(
+            &mut scanner.release(),
+            mux,
+            &ids,
+            &lying,
+            findings,
+            interrupt,
+        );
+    }
+}
+
+/// How the sensors are while nobody is asked to move.
+fn watch_lying(scanner: &mut Scanner<Port>, pc: &mut Pc, interrupt: &Interrupt) -> own::Lying {
+    let mut lying = own::Lying::default();
+    let end = Instant::now() + LYING;
+    while Instant::now() < end && !interrupt.asked() {
+        let now = pc.now();
+        match scanner.poll(now) {
+            Some(frame) => lying.take(&frame, now),
+            None => {
+                let due = scanner.next_due().unwrap_or(now + LOOK);
+                pc.wait_until(due.clamp(now, now + LOOK));
+            }
+        }
+    }
+    lying
 }
 
 /// How a sensor did from its first good sample on.
