@@ -3,11 +3,12 @@
 use std::path::Path;
 use std::time::Duration;
 
-use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::{Args, ValueEnum};
 
 use host::failure::Failure;
 use host::lines::{Model, Settings};
+use host::session::Driving;
 
 /// How a gripper's line differs from that of a gripper as delivered.
 #[derive(Debug, Clone, Copy, Default, Args)]
@@ -40,6 +41,47 @@ impl LineOptions {
             unit: self.unit,
             baud: self.baud,
             patience: self.patience,
+        }
+    }
+}
+
+/// How the gripper is driven, where that is not as usual.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct DrivingOptions {
+    /// How fast the fingers go, 0 to 255, if not 255.
+    #[arg(long, value_name = "N")]
+    pub speed: Option<u8>,
+    /// How hard they press, 0 (weakest, which is not none) to 255, if not 64.
+    #[arg(long, value_name = "N")]
+    pub force: Option<u8>,
+    /// Fastest change of a commanded position, counts a second (10 to 2000), if not 400.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(10..=2_000))]
+    pub rate: Option<u16>,
+    /// After half a second without data or a heartbeat: hold, or open slowly; if not hold.
+    #[arg(long, value_enum, value_name = "ACTION")]
+    pub safe_action: Option<SafeAction>,
+}
+
+/// What a hold becomes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SafeAction {
+    /// Stay: what is grasped stays grasped.
+    Hold,
+    /// Open the fingers slowly.
+    OpenSlowly,
+}
+
+impl DrivingOptions {
+    /// The same for a session.
+    pub fn given(&self) -> Driving {
+        Driving {
+            speed: self.speed,
+            force: self.force,
+            rate: self.rate.map(f32::from),
+            safe_action: self.safe_action.map(|action| match action {
+                SafeAction::Hold => bridge::SafeAction::Hold,
+                SafeAction::OpenSlowly => bridge::SafeAction::OpenSlowly,
+            }),
         }
     }
 }

@@ -13,8 +13,10 @@ use bridge::protocol::message::{
     Counters, GripperStatus, Health, Hello, PerAxis, Restart, SlotContents, Slots, Status,
     WeightsKind,
 };
-use gauntlet::results::{devices, gloves, maps, named, paper, runs};
+use gauntlet::results::{calibrations, devices, gloves, maps, named, paper, runs, settings};
 use gripper::{Activation, Fault};
+use host::calibration::guide::{Check, Finding as Found, Joint};
+use host::calibration::profile_file::Quality as Grade;
 use host::chip::link::Flashed;
 use host::diagnose::{Finding, Findings, Verdict};
 use host::failure::{Failure, Told};
@@ -22,6 +24,7 @@ use host::lines::list::Listed;
 use host::next::{Command, Warning, advice};
 use host::recording::Written;
 use host::session::{Stopped, Summary};
+use host::settings::Value;
 use host::training::model::Int16;
 use host::training::quality::{Bar, Measured, Quality};
 use host::training::recorded::Seen;
@@ -551,4 +554,93 @@ fn every_name_is_on_the_page() {
         .filter(|name| !page.contains(&format!("`{name}`")))
         .collect();
     assert!(missing.is_empty(), "not in docs/json.md: {missing:?}");
+}
+
+#[test]
+fn calibrations_and_settings() {
+    let finding = || Found {
+        verdict: "bad",
+        segment: Some("ring_distal"),
+        what: "ring_distal lay 20° tilted".to_owned(),
+        todo: "the last flat pose again".to_owned(),
+    };
+    let quality = || Grade {
+        verdict: "bad".to_owned(),
+        fit_deg: 2.1,
+        ratio: 0.57,
+        tilt_deg: 20.0,
+        heading_deg: 1.5,
+        findings: vec!["ring_distal lay 20° tilted".to_owned()],
+    };
+    let error = Failure::new("not good enough to be used", "the last flat pose again").into();
+    let calibrated = calibrations::Calibrated {
+        place: "/dev/ttyUSB0".to_owned(),
+        profile: Some("glove-0a1b2c3d.toml".to_owned()),
+        hand: Some("right"),
+        declared: Some("left"),
+        sensors: Some("moved"),
+        moved: vec![calibrations::Seat {
+            segment: "middle_middle",
+            sensor: 11,
+        }],
+        quality: Some(quality()),
+        findings: vec![finding()],
+        joints: vec![Joint {
+            segment: "ring_distal",
+            sensor: 12,
+            verdict: "bad",
+            checks: vec![Check {
+                check: "tilt_deg",
+                value: 20.0,
+                limit: 10.0,
+                holds: false,
+            }],
+        }],
+        again: vec![calibrations::Repeated {
+            step: "turn",
+            why: "turn further".to_owned(),
+        }],
+        took_s: 61.0,
+        scanned: gloves::Scanned::default(),
+        next: Command::gauntlet("record").into(),
+        failure: Some(Told::of(&error)),
+    };
+    let pose = calibrations::FlatPose {
+        place: "/dev/ttyUSB0".to_owned(),
+        profile: "glove-0a1b2c3d.toml".to_owned(),
+        calibrated: "2026-11-29T11:22:33Z".to_owned(),
+        findings: vec![finding()],
+        failure: Some(Told::of(&error)),
+    };
+    let list = calibrations::List {
+        folder: "gloves".to_owned(),
+        profiles: vec![calibrations::Listed {
+            profile: "glove-0a1b2c3d.toml".to_owned(),
+            calibrated: Some("2026-11-29T11:22:33Z".to_owned()),
+            hand: Some("right"),
+            quality: Some(quality()),
+            ids: Some(vec!["00ff".to_owned()]),
+            refused: Some("its numbers are not as they were measured".to_owned()),
+        }],
+    };
+    let preferred = settings::Settings {
+        path: "settings.toml".to_owned(),
+        is_there: true,
+        settings: vec![settings::Setting {
+            key: "gripper.speed",
+            value: Some(Value::Whole(100)),
+            default: Some(Value::Whole(255)),
+            given: true,
+            means: "How fast its fingers go.",
+        }],
+    };
+    golden(
+        "calibrations.json",
+        &[
+            sample("calibrate", calibrated),
+            sample("calibrate --flat", pose),
+            sample("calibrate --list", list),
+            sample("settings", preferred),
+        ],
+    );
 }

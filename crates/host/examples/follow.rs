@@ -27,6 +27,7 @@ fn main() -> anyhow::Result<()> {
         image: std::fs::read(image)?,
         side: glove::hand::Side::Right,
         profile: None,
+        driving: host::session::Driving::default(),
         feed: None,
     };
     let mut session = InProcess::start(parts, clock, &interrupt)?;

@@ -161,7 +161,7 @@ impl Settings {
         self.given(name).cloned().or_else(default)
     }
 
-    /// The whole, each key with its meaning, as a file: what has no value is commented out.
+    /// The whole, each key with its meaning, as a file: what it does not give is commented out, with its default or an example.
     pub fn to_toml(&self) -> String {
         let mut text = String::new();
         for section in SECTIONS {
@@ -171,10 +171,14 @@ impl Settings {
                 if text.is_empty() { "" } else { "\n" }
             );
             for key in KEYS.iter().filter(|key| key.section() == section) {
+                let _ = writeln!(text, "# {}", key.help);
                 let name = key.within();
-                let _ = match self.value(key.name) {
-                    Some(value) => writeln!(text, "# {}\n{name} = {}", key.help, value.toml()),
-                    None => writeln!(text, "# {}\n# {name} = {}", key.help, key.example),
+                let _ = match (self.given(key.name), key.default.is_empty()) {
+                    (Some(value), _) => writeln!(text, "{name} = {}", value.toml()),
+                    (None, false) => writeln!(text, "# {name} = {}", key.default),
+                    (None, true) => {
+                        writeln!(text, "# {name} = {} # an example: no default", key.example)
+                    }
                 };
             }
         }

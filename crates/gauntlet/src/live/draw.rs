@@ -21,7 +21,7 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     if area.width < BOXES.0 || area.height < BOXES.1 {
         return small::draw(view, frame);
     }
-    let keys = key_lines(view.keys, area.width);
+    let keys = key_lines(&view.keys, area.width);
     let [head, hand, gripper, numbers, faults, foot] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(8),

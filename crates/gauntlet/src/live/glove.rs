@@ -71,7 +71,7 @@ pub struct GloveView {
     /// What is wrong now, in words; empty when all is well.
     pub faults: Vec<String>,
     /// What keys do.
-    pub keys: &'static str,
+    pub keys: String,
 }
 
 impl GloveView {
@@ -109,7 +109,7 @@ impl GloveView {
 
     fn boxes(&self, frame: &mut Frame<'_>) {
         let area = frame.area();
-        let keys = key_lines(self.keys, area.width);
+        let keys = key_lines(&self.keys, area.width);
         let [head, hand, sensors, rates, faults, foot] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Length(8),
@@ -149,7 +149,7 @@ impl GloveView {
     }
 
     fn small(&self, area: Rect) -> Vec<Line<'_>> {
-        let keys = key_lines(self.keys, area.width);
+        let keys = key_lines(&self.keys, area.width);
         let rates: Vec<Line<'_>> = wrapped(&self.rates(), area.width)
             .into_iter()
             .map(Line::raw)
@@ -285,7 +285,7 @@ mod tests {
             jitter_us: Some(1_100),
             baud: 115_200,
             faults: vec!["the sensor on ring_middle is frozen".to_owned()],
-            keys: "q: end",
+            keys: "q: end".to_owned(),
         }
     }
 

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
-use super::key::Key;
+use super::key::{Bindings, Key};
 
 /// After text, space and `c` are text for so long.
 const TEXT: Duration = Duration::from_secs(1);
@@ -44,6 +44,8 @@ fn ready(descriptor: &impl std::os::fd::AsFd) -> PollFlags {
 /// The keyboard of a terminal in raw mode.
 #[derive(Debug, Default)]
 pub(super) struct Keyboard {
+    /// Which keys mean what.
+    bindings: Bindings,
     /// A sequence whose end has not come.
     rest: Vec<u8>,
     /// Inside a paste, until then at most.
@@ -53,6 +55,13 @@ pub(super) struct Keyboard {
 }
 
 impl Keyboard {
+    pub(super) fn new(bindings: Bindings) -> Self {
+        Self {
+            bindings,
+            ..Self::default()
+        }
+    }
+
     /// Keys pressed since the last call; [`Key::End`] when the terminal is gone.
     pub(super) fn read(&mut self, now: Instant) -> Vec<Key> {
         let stdin = std::io::stdin();
@@ -120,22 +129,29 @@ impl Keyboard {
     }
 
     fn typed(&mut self, typed: &[u8], now: Instant) -> Vec<Key> {
-        let ends = |byte: &u8| matches!(*byte, b'q' | ESCAPE | CTRL_D);
+        let Bindings {
+            clutch,
+            calibrate,
+            end,
+        } = self.bindings;
+        let ends = |byte: &u8| *byte == end || matches!(*byte, ESCAPE | CTRL_D);
         let text = self.text.is_some_and(|until| now < until);
         match typed {
             [] => Vec::new(),
             [byte] if ends(byte) => vec![Key::End],
-            [b' '] if text => vec![Key::Open],
-            [b' '] => vec![Key::Clutch],
-            [b'c'] if !text => vec![Key::Calibrate],
+            [byte] if *byte == clutch && text => vec![Key::Open],
+            [byte] if *byte == clutch => vec![Key::Clutch],
+            [byte] if *byte == calibrate && !text => vec![Key::Calibrate],
             [b'r'] if !text => {
                 // Where it is no key it is text.
                 self.text = Some(now + TEXT);
                 vec![Key::Again]
             }
             // A key that was held down, or pressed while this program was not looking.
-            keys if keys.iter().all(|byte| *byte == b' ') => vec![Key::Open],
-            keys if keys.iter().all(|byte| ends(byte) || b" c".contains(byte))
+            keys if keys.iter().all(|byte| *byte == clutch) => vec![Key::Open],
+            keys if keys
+                .iter()
+                .all(|byte| ends(byte) || [clutch, calibrate].contains(byte))
                 && keys.iter().any(ends) =>
             {
                 vec![Key::End]
@@ -184,6 +200,28 @@ mod tests {
         ] {
             let (mut keys, now) = keyboard();
             assert_eq!(keys.meaning(bytes, now), [key], "{bytes:?}");
+        }
+    }
+
+    #[test]
+    fn keys_that_a_person_prefers_mean_the_same_and_the_usual_ones_are_text() {
+        let bindings = Bindings {
+            clutch: b'x',
+            calibrate: b'f',
+            end: b'.',
+        };
+        for (bytes, key) in [
+            (&b"x"[..], &[Key::Clutch][..]),
+            (b"f", &[Key::Calibrate]),
+            (b".", &[Key::End]),
+            (b"\x1b", &[Key::End]),
+            (b"xx", &[Key::Open]),
+            (b" ", &[]),
+            (b"c", &[]),
+            (b"q", &[]),
+        ] {
+            let mut keys = Keyboard::new(bindings);
+            assert_eq!(keys.meaning(bytes, Instant::now()), key, "{bytes:?}");
         }
     }
 

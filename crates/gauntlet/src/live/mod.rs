@@ -20,7 +20,7 @@ use ratatui::backend::CrosstermBackend;
 use ratatui::layout::Rect;
 use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
 
-pub use key::Key;
+pub use key::{Bindings, Key};
 pub use small::LEAST;
 pub use view::{Axis, Finger, View};
 
@@ -95,7 +95,7 @@ impl Drawn {
         Ok(Self {
             terminal: empty(area)?,
             area,
-            keyboard: Keyboard::default(),
+            keyboard: Keyboard::new(Bindings::load()),
             raw,
         })
     }

@@ -39,7 +39,7 @@ pub(super) fn too_small(state: &str) -> Vec<Line<'_>> {
 
 fn lines(view: &View, width: u16, height: usize) -> Vec<Line<'_>> {
     let axes = axes(view, width);
-    let keys = key_lines(view.keys, width);
+    let keys = key_lines(&view.keys, width);
     // State, axes, and two lines for what is wrong are always there; what is left goes to the others in this order.
     let mut room = height.saturating_sub(1 + axes.len() + 2);
     let mut fit = |part: Vec<Line<'static>>| {

@@ -53,7 +53,7 @@ fn view() -> View {
         dropped: 3,
         faults: vec!["sensor ring_middle: no answer".to_owned()],
         gripper_faults: 2,
-        keys: "space: clutch   q: stop",
+        keys: "space: clutch   q: stop".to_owned(),
     }
 }
 

@@ -67,7 +67,7 @@ pub struct View {
     /// How often a fault of the gripper ended motion.
     pub gripper_faults: u32,
     /// What keys do.
-    pub keys: &'static str,
+    pub keys: String,
 }
 
 impl View {

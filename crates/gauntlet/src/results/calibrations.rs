@@ -1,13 +1,14 @@
 //! Results of `calibrate`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glove::calibration::Identity;
 use glove::hand::{SEGMENT_NAMES, Side};
+use host::calibration::Judged;
 use host::calibration::guide::{Finding, Joint};
 use host::calibration::profile_file::{Quality, id_text};
-use host::calibration::{Judged, Kept};
-use host::failure::{Failure, Told};
+use host::calibration::profile_store::Entry;
+use host::failure::Told;
 use host::next::NextStep;
 use serde::Serialize;
 
@@ -166,7 +167,7 @@ pub struct Listed {
 
 impl Listed {
     /// Of an entry of the store.
-    pub fn of((path, kept): &(PathBuf, Result<Kept, Failure>)) -> Self {
+    pub fn of((path, kept): &Entry) -> Self {
         let good = kept.as_ref().ok();
         Self {
             profile: path.display().to_string(),

@@ -11,7 +11,7 @@ use glove::hand::{LIMITS, SEGMENT_COUNT};
 use glove::scan::{Finding, Health};
 use gripper::{Activation, Contact};
 
-use crate::live::{Axis, Finger};
+use crate::live::{Axis, Bindings, Finger};
 use host::next::Command;
 use host::realtime::Scheduling;
 use host::session::axes::MOST;
@@ -205,7 +205,7 @@ fn is_good(snapshot: &Snapshot, segment: usize) -> bool {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Hands {
     /// Press keys.
-    Keys,
+    Keys(Bindings),
     /// Only start the run anew: there is no terminal.
     Options,
     /// First make the glove's profile, which is not there, with this command.
@@ -218,7 +218,7 @@ impl Hands {
     /// `keys`: they can be pressed; `drives`: they do something.
     pub(super) fn of(keys: bool, drives: bool, devices: &Devices) -> Self {
         match (keys, drives) {
-            (true, true) => Self::Keys,
+            (true, true) => Self::Keys(Bindings::load()),
             (false, true) => Self::Options,
             (_, false) => Self::None(devices.bridge("bridge calibrate")),
         }
@@ -227,10 +227,15 @@ impl Hands {
     /// How a glove is calibrated from here, and how the clutch is opened before it.
     fn calibrate(&self, closed: bool) -> String {
         match (self, closed) {
-            (Self::Keys, false) => "lay the hand flat and still, press c".to_owned(),
-            (Self::Keys, true) => {
-                "open the clutch (space), lay the hand flat and still, press c".to_owned()
-            }
+            (Self::Keys(keys), false) => format!(
+                "lay the hand flat and still, press {}",
+                Bindings::name(keys.calibrate)
+            ),
+            (Self::Keys(keys), true) => format!(
+                "open the clutch ({}), lay the hand flat and still, press {}",
+                Bindings::name(keys.clutch),
+                Bindings::name(keys.calibrate)
+            ),
             (Self::Options, _) => {
                 "the same with --calibrate-flat, the hand flat and still".to_owned()
             }
@@ -242,10 +247,10 @@ impl Hands {
         }
     }
 
-    fn open(&self) -> &'static str {
+    fn open(&self) -> String {
         match self {
-            Self::Keys => "open the clutch (space)",
-            Self::Options | Self::Profile(_) | Self::None(_) => "open the clutch",
+            Self::Keys(keys) => format!("open the clutch ({})", Bindings::name(keys.clutch)),
+            Self::Options | Self::Profile(_) | Self::None(_) => "open the clutch".to_owned(),
         }
     }
 }
@@ -375,7 +380,7 @@ mod tests {
         let chip = Devices::Chip("/dev/ttyACM0".parse().unwrap());
         let idle = uncalibrated(Position::Open, State::Idle);
         for (hands, words) in [
-            (Hands::Keys, "press c"),
+            (Hands::Keys(Bindings::default()), "press c"),
             (Hands::Options, "--calibrate-flat"),
             (
                 Hands::of(true, false, &chip),
@@ -389,11 +394,15 @@ mod tests {
             );
         }
         let held = State::Holding(HoldReason::NotCalibrated);
-        let told = standing(&uncalibrated(Position::Closed, held), &Hands::Keys).join("; ");
+        let told = standing(
+            &uncalibrated(Position::Closed, held),
+            &Hands::Keys(Bindings::default()),
+        )
+        .join("; ");
         assert!(told.contains("open the clutch (space)"), "{told}");
         let mut calibrated = idle;
         calibrated.calibration.is_calibrated = true;
-        assert!(standing(&calibrated, &Hands::Keys).is_empty());
+        assert!(standing(&calibrated, &Hands::Keys(Bindings::default())).is_empty());
         // A bridge of an older version never says.
         let unknown = Snapshot {
             calibration_known: false,
@@ -410,7 +419,7 @@ mod tests {
             by: 0.3,
         });
         snapshot.calibration.newest = refused;
-        let told = standing(&snapshot, &Hands::Keys).join("; ");
+        let told = standing(&snapshot, &Hands::Keys(Bindings::default())).join("; ");
         assert!(
             told.contains("index_proximal") && told.contains("press c"),
             "{told}"

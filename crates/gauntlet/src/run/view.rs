@@ -8,7 +8,7 @@ use bridge::clutch::Position;
 
 use super::shown::{self, Hands};
 use super::{Options, Run};
-use crate::live::View;
+use crate::live::{Bindings, View};
 use host::next::Command;
 use host::session::{CLOSED_TOO_LATE, Devices, Snapshot};
 
@@ -36,14 +36,7 @@ impl Run {
                 &self.hands(snapshot.as_ref(), keys, options.drives),
             ),
             gripper_faults: progress.gripper_faults,
-            keys: match (keys, options.drives) {
-                (true, true) => {
-                    "space: close or open the clutch   c: calibrate on a flat hand   q: hold and end"
-                }
-                (true, false) => "q: end",
-                (false, true) => "Ctrl-C: hold and end",
-                (false, false) => "Ctrl-C: end",
-            },
+            keys: key_words(keys, options.drives),
         };
         if let Some(snapshot) = &snapshot {
             view.state = self.state_words(snapshot, keys && options.drives);
@@ -76,9 +69,10 @@ impl Run {
             return format!("{name}: not calibrated");
         }
         if keys && !self.clutch.closed {
+            let space = Bindings::name(Bindings::load().clutch);
             match snapshot.clutch {
-                Position::Open => return format!("{name}: space closes the clutch"),
-                Position::Expired => return format!("{name}: space closes the clutch again"),
+                Position::Open => return format!("{name}: {space} closes the clutch"),
+                Position::Expired => return format!("{name}: {space} closes the clutch again"),
                 Position::Closed | Position::Lost => {}
             }
         }
@@ -108,5 +102,20 @@ impl Run {
             faults.extend(self.shown.faults(snapshot, scheduling, hands, now));
         }
         faults
+    }
+}
+
+/// What keys do.
+fn key_words(keys: bool, drives: bool) -> String {
+    let bindings = Bindings::load();
+    let [clutch, calibrate, end] =
+        [bindings.clutch, bindings.calibrate, bindings.end].map(Bindings::name);
+    match (keys, drives) {
+        (true, true) => format!(
+            "{clutch}: close or open the clutch   {calibrate}: calibrate on a flat hand   {end}: hold and end"
+        ),
+        (true, false) => format!("{end}: end"),
+        (false, true) => "Ctrl-C: hold and end".to_owned(),
+        (false, false) => "Ctrl-C: end".to_owned(),
     }
 }

@@ -5,16 +5,15 @@
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use glove::calibration::{Bound, Misfit, Profile};
+use glove::calibration::{Bound, Profile};
 use glove::hand::{Quaternion, SEGMENT_COUNT, SEGMENT_NAMES, Side};
 use glove::imu::UniqueId;
 use serde::{Deserialize, Serialize};
 
 use crate::failure::Failure;
 use crate::next::{Command, NextStep, advice};
-use crate::settings::place;
 use crate::{toml_file, words};
 
 /// Of this form.
@@ -306,159 +305,5 @@ fn rotation(components: [f64; 4]) -> Quaternion {
     Quaternion::new_unchecked(nalgebra::Quaternion::new(w, x, y, z))
 }
 
-/// The profiles of this user's gloves: files in one folder.
-#[derive(Debug, Clone)]
-pub struct ProfileStore {
-    folder: PathBuf,
-}
-
-/// A glove's profile among those that are there.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Found {
-    /// This one is of the glove; the newest, where there are several.
-    Fits(PathBuf, Box<Kept>),
-    /// None is, but this one is of most of its sensors.
-    Nearly(PathBuf, Misfit),
-    /// The glove's ids tell nothing.
-    Untold(Misfit),
-    /// None.
-    Nothing,
-}
-
-/// The profile of the glove with these ids: the named one, else what they find among this user's. Else why there is none.
-///
-/// # Errors
-/// The named file is none, or this user's cannot be looked at.
-pub fn profile_of(
-    named: Option<&Path>,
-    ids: &[Option<UniqueId>; SEGMENT_COUNT],
-) -> Result<Result<(PathBuf, Box<Kept>), String>, Failure> {
-    let of_another = |path: &Path, misfit: Misfit| Ok(Err(format!("{}: {misfit}", path.display())));
-    if let Some(path) = named {
-        let kept = Kept::read(path)?;
-        return match kept.bound.fits(ids) {
-            Ok(()) => Ok(Ok((path.to_owned(), Box::new(kept)))),
-            Err(misfit) => of_another(path, misfit),
-        };
-    }
-    let store = ProfileStore::usual()?;
-    match store.find(ids)? {
-        Found::Fits(path, kept) => Ok(Ok((path, kept))),
-        Found::Nearly(path, misfit) => of_another(&path, misfit),
-        Found::Untold(misfit) => Ok(Err(misfit.to_string())),
-        Found::Nothing => {
-            let folder = store.folder().display();
-            Ok(Err(format!("there is no profile of it in {folder}")))
-        }
-    }
-}
-
-impl ProfileStore {
-    /// Where this user's profiles lie.
-    ///
-    /// # Errors
-    /// The system does not say where a user's settings lie.
-    pub fn usual() -> Result<Self, Failure> {
-        Ok(Self::at(place::folder()?.join("gloves")))
-    }
-
-    /// In another folder; it is made when the first profile is saved.
-    pub fn at(folder: impl Into<PathBuf>) -> Self {
-        Self {
-            folder: folder.into(),
-        }
-    }
-
-    /// The folder.
-    pub fn folder(&self) -> &Path {
-        &self.folder
-    }
-
-    /// The file of a glove with these ids.
-    pub fn path_of(&self, ids: &[UniqueId; SEGMENT_COUNT]) -> PathBuf {
-        let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(ids.as_flattened());
-        self.folder.join(format!("glove-{crc:08x}.toml"))
-    }
-
-    /// Keeps a profile in place of the glove's older one; returns its path.
-    ///
-    /// # Errors
-    /// The folder cannot be made, or the file not be written.
-    pub fn save(&self, kept: &Kept) -> Result<PathBuf, Failure> {
-        std::fs::create_dir_all(&self.folder).map_err(|error| {
-            let what = format!(
-                "the folder {} cannot be made: {}",
-                self.folder.display(),
-                words::disk(&error)
-            );
-            Failure::new(what, "another place for the profile, with --out FILE")
-        })?;
-        let path = self.path_of(&kept.bound.ids);
-        kept.write(&path)?;
-        Ok(path)
-    }
-
-    /// Every profile, by name; what cannot be read with why.
-    ///
-    /// # Errors
-    /// The folder is there and cannot be read.
-    pub fn list(&self) -> Result<Vec<(PathBuf, Result<Kept, Failure>)>, Failure> {
-        let entries = match std::fs::read_dir(&self.folder) {
-            Ok(entries) => entries,
-            Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(Vec::new()),
-            Err(error) => {
-                let what = format!("the folder {}: {error}", self.folder.display());
-                return Err(Failure::new(what, "a folder that you may read"));
-            }
-        };
-        let mut paths: Vec<PathBuf> = entries
-            .filter_map(|entry| Some(entry.ok()?.path()))
-            .filter(|path| path.extension().is_some_and(|ending| ending == "toml"))
-            .collect();
-        paths.sort();
-        let read = |path: PathBuf| {
-            let kept = Kept::read(&path);
-            (path, kept)
-        };
-        Ok(paths.into_iter().map(read).collect())
-    }
-
-    /// The profile of the glove with these ids, as far as they were read. Files that cannot be read are passed over.
-    ///
-    /// # Errors
-    /// As [`ProfileStore::list`].
-    pub fn find(&self, ids: &[Option<UniqueId>; SEGMENT_COUNT]) -> Result<Found, Failure> {
-        let mut best: Option<(PathBuf, Kept)> = None;
-        let mut nearest: Option<(PathBuf, Misfit, u32)> = None;
-        for (path, kept) in self.list()? {
-            let Ok(kept) = kept else { continue };
-            match kept.bound.fits(ids) {
-                Ok(()) => {
-                    if best
-                        .as_ref()
-                        .is_none_or(|(_, old)| old.calibrated < kept.calibrated)
-                    {
-                        best = Some((path, kept));
-                    }
-                }
-                Err(misfit @ Misfit::Differ(sensors)) => {
-                    let differ = sensors.count_ones();
-                    // Most of the sensors are those of the profile.
-                    let known = ids.iter().flatten().count() as u32;
-                    if 2 * differ < known && nearest.as_ref().is_none_or(|(.., n)| differ < *n) {
-                        nearest = Some((path, misfit, differ));
-                    }
-                }
-                Err(misfit) => return Ok(Found::Untold(misfit)),
-            }
-        }
-        Ok(match (best, nearest) {
-            (Some((path, kept)), _) => Found::Fits(path, Box::new(kept)),
-            (None, Some((path, misfit, _))) => Found::Nearly(path, misfit),
-            (None, None) => Found::Nothing,
-        })
-    }
-}
-
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -6,7 +6,7 @@
 use std::thread::JoinHandle;
 
 use anyhow::Result;
-use bridge::{App, Board, WeightsStore};
+use bridge::{App, Board, SafeAction, WeightsStore};
 use glove::calibration::Bound;
 use glove::hand::Side;
 use glove::scan::{self, Scanner};
@@ -44,8 +44,37 @@ pub struct Parts {
     pub side: Side,
     /// The glove's profile, if it has one.
     pub profile: Option<Bound>,
+    /// How the gripper is driven.
+    pub driving: Driving,
     /// Whom every frame, command, status and event is handed to.
     pub feed: Option<Feed>,
+}
+
+/// How the gripper is driven, where that is not as usual.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Driving {
+    /// Speed of every axis: 0 slowest to 255 fastest.
+    pub speed: Option<u8>,
+    /// Force of every axis: 0 weakest, which is not none, to 255 strongest.
+    pub force: Option<u8>,
+    /// Fastest change of a commanded position, 10 to 2,000 counts a second.
+    pub rate: Option<f32>,
+    /// What a hold becomes after half a second.
+    pub safe_action: Option<SafeAction>,
+}
+
+impl Driving {
+    fn settings<const X: usize>(&self, side: Side) -> bridge::Settings<X> {
+        let usual = bridge::Settings::<X>::default();
+        bridge::Settings {
+            side,
+            speed: self.speed.map_or(usual.speed, |speed| [speed; X]),
+            force: self.force.map_or(usual.force, |force| [force; X]),
+            rate: self.rate.unwrap_or(usual.rate),
+            safe_action: self.safe_action.unwrap_or(usual.safe_action),
+            ..usual
+        }
+    }
 }
 
 /// A bridge in this process.
@@ -83,10 +112,7 @@ impl InProcess {
         Pc: Board<X, Glove = Port, Flash = MemorySlot>,
     {
         let store = stored(&parts.image, parts.model)?;
-        let settings = bridge::Settings::<X> {
-            side: parts.side,
-            ..bridge::Settings::default()
-        };
+        let settings = parts.driving.settings::<X>(parts.side);
         let config = bridge::Config::new(settings)
             .or_fail(|| "the bridge's settings".to_owned(), "others")?;
         let (orders, queue) = Orders::queue(clock);
@@ -236,4 +262,29 @@ fn stored(image: &[u8], model: Model) -> Result<WeightsStore<MemorySlot>> {
     }
     store.commit().or_fail(refused, next)?;
     Ok(store)
+}
+
+#[cfg(test)]
+mod driving_tests {
+    use super::*;
+
+    #[test]
+    fn what_is_not_said_of_driving_is_as_usual_and_what_is_said_counts_for_every_axis() {
+        let usual = Driving::default().settings::<4>(Side::Left);
+        let expected = bridge::Settings {
+            side: Side::Left,
+            ..bridge::Settings::<4>::default()
+        };
+        assert_eq!(usual, expected);
+        let driving = Driving {
+            speed: Some(90),
+            force: Some(0),
+            rate: Some(100.0),
+            safe_action: Some(SafeAction::OpenSlowly),
+        };
+        let settings = driving.settings::<4>(Side::Right);
+        assert_eq!((settings.speed, settings.force), ([90; 4], [0; 4]));
+        assert_eq!(settings.safe_action, SafeAction::OpenSlowly);
+        assert!(bridge::Config::new(settings).is_ok());
+    }
 }

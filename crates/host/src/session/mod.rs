@@ -47,7 +47,7 @@ pub use devices::Devices;
 pub use driven::Driven;
 pub use ending::{CLOSED_TOO_LATE, Driver, Ending};
 pub use hub::{Happened, Hub};
-pub use in_process::{InProcess, Parts, check_image};
+pub use in_process::{Driving, InProcess, Parts, check_image};
 pub use numbers::Progress;
 pub use on_chip::OnChip;
 pub use orders::{Order, Orders};

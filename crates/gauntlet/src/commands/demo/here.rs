@@ -82,6 +82,7 @@ fn opened(
         image,
         side: Side::Right,
         profile: None,
+        driving: host::session::Driving::default(),
         feed,
     })
 }

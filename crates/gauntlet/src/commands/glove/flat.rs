@@ -1,6 +1,5 @@
 //! A person lays the hand flat.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -24,22 +23,6 @@ const SAID_EVERY: Duration = Duration::from_secs(3);
 /// # Errors
 /// Why the hand was not taken; what ended the reading.
 pub(in crate::commands) fn take_flat(
-    glove: &Path,
-    hand: &mut Hand,
-    scanning: &mut Scanning,
-    clock: Clock,
-    tell: &Tell,
-    interrupt: &Interrupt,
-) -> Result<bool> {
-    // A virtual one does it by itself.
-    let person = VirtualPerson::at(glove);
-    person.iter().for_each(|person| person.ask(Step::FirstFlat));
-    let taken = wait_for_flat(hand, scanning, clock, tell, interrupt);
-    person.iter().for_each(VirtualPerson::let_go);
-    taken
-}
-
-fn wait_for_flat(
     hand: &mut Hand,
     scanning: &mut Scanning,
     clock: Clock,
@@ -50,6 +33,24 @@ fn wait_for_flat(
     // What waited is of before.
     scanning.waiting().for_each(drop);
     hand.begin_flat(clock.now(), ticks(FLAT_WAIT));
+    let person = VirtualPerson::at(scanning.port().path());
+    if let Some(person) = &person {
+        person.ask(Step::FirstFlat);
+    }
+    let taken = wait(hand, scanning, clock, tell, interrupt);
+    if let Some(person) = &person {
+        person.let_go();
+    }
+    taken
+}
+
+fn wait(
+    hand: &mut Hand,
+    scanning: &mut Scanning,
+    clock: Clock,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<bool> {
     let mut said = Instant::now();
     loop {
         match scanning.next(ROUND) {

@@ -10,7 +10,7 @@ use glove::scan::{Health, State};
 
 use super::Watch;
 use crate::live::glove::{GloveView, Sensor};
-use crate::live::{Finger, Key, Live};
+use crate::live::{Bindings, Finger, Key, Live};
 use crate::results::{self, gloves};
 use crate::run::FLAT_WAIT;
 use crate::say;
@@ -163,6 +163,8 @@ impl Watching {
     }
 
     fn view(&self, options: &Watch, elapsed: Duration, keys: bool) -> GloveView {
+        let bindings = Bindings::load();
+        let [calibrate, end] = [bindings.calibrate, bindings.end].map(Bindings::name);
         let snapshot = self.scanning.snapshot();
         let seen = snapshot.as_ref();
         let calibrated = self.hand.is_calibrated();
@@ -183,9 +185,9 @@ impl Watching {
             baud: seen.map_or(0, |seen| seen.baud),
             faults: self.faults(seen, keys),
             keys: match (keys, &self.unknown) {
-                (true, None) => "c: the hand lies flat   q: end",
-                (true, Some(_)) => "q: end",
-                (false, _) => "Ctrl-C: end",
+                (true, None) => format!("{calibrate}: the hand lies flat   {end}: end"),
+                (true, Some(_)) => format!("{end}: end"),
+                (false, _) => "Ctrl-C: end".to_owned(),
             },
         }
     }

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use crate::options::{LineOptions, model_parser, run_time};
+use crate::options::{DrivingOptions, LineOptions, model_parser, run_time};
 use host::lines::Model;
 
 /// Which hand wears the glove.
@@ -62,6 +62,9 @@ pub struct Teleop {
     /// How the gripper's line differs from that of a gripper as delivered.
     #[command(flatten)]
     pub line: LineOptions,
+    /// How the gripper is driven.
+    #[command(flatten)]
+    pub driving: DrivingOptions,
     /// Which gripper it is; the map gives as many positions as it has axes.
     #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
     pub gripper_model: Model,

@@ -86,6 +86,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         image,
         side: side(options.hand),
         profile: None,
+        driving: options.driving.given(),
         feed,
     };
     let session = InProcess::start(parts, clock, interrupt)?;

@@ -6,7 +6,7 @@ fn unit(w: f32, x: f32, y: f32, z: f32) -> Quaternion {
 }
 
 /// A profile with numbers of every length, and ids that `glove` makes.
-fn kept(glove: u8) -> Kept {
+pub(crate) fn kept(glove: u8) -> Kept {
     let mut profile = Profile::straight(Side::Left);
     profile.sensors.swap(8, 11);
     for (k, (mounting, axis)) in profile
@@ -160,79 +160,6 @@ fn a_file_that_is_not_there_is_no_text_or_endless_is_named() {
     );
     let error = Kept::read(Path::new("/dev/zero")).unwrap_err();
     assert!(error.to_string().contains("longer than 64 kB"), "{error}");
-}
-
-#[test]
-fn a_glove_finds_its_own_profile_by_its_ids_and_the_newest_of_several() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = ProfileStore::at(folder.path().join("not yet/gloves"));
-    let (own, other) = (kept(1), kept(2));
-    let ids = own.bound.ids.map(Some);
-    assert_eq!(store.find(&ids).unwrap(), Found::Nothing);
-    let path = store.save(&own).unwrap();
-    store.save(&other).unwrap();
-    assert_eq!(
-        store.find(&ids).unwrap(),
-        Found::Fits(path.clone(), Box::new(own.clone()))
-    );
-    let mut newer = own.clone();
-    newer.calibrated = "2027-01-01T00:00:00Z".to_owned();
-    let beside = store.folder().join("z.toml");
-    newer.write(&beside).unwrap();
-    assert_eq!(
-        store.find(&ids).unwrap(),
-        Found::Fits(beside, Box::new(newer))
-    );
-    // Saved anew it takes its own file's place.
-    assert_eq!(store.save(&own).unwrap(), path);
-    assert_eq!(store.list().unwrap().len(), 3);
-}
-
-#[test]
-fn a_glove_with_an_exchanged_sensor_is_told_which_and_another_glove_finds_nothing() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = ProfileStore::at(folder.path());
-    let path = store.save(&kept(1)).unwrap();
-    let mut ids = kept(1).bound.ids.map(Some);
-    ids[11] = Some([0xAA; 16]);
-    ids[2] = None;
-    assert_eq!(
-        store.find(&ids).unwrap(),
-        Found::Nearly(path, Misfit::Differ(1 << 11))
-    );
-    assert_eq!(
-        store.find(&kept(9).bound.ids.map(Some)).unwrap(),
-        Found::Nothing
-    );
-    let alike = Found::Untold(Misfit::Alike(u16::MAX));
-    assert_eq!(store.find(&[Some([1; 16]); 16]).unwrap(), alike);
-    assert_eq!(
-        store.find(&[None; 16]).unwrap(),
-        Found::Untold(Misfit::NoIds)
-    );
-}
-
-#[test]
-fn a_profile_that_cannot_be_read_hides_no_other_and_is_listed_with_why() {
-    let folder = tempfile::tempdir().unwrap();
-    let store = ProfileStore::at(folder.path());
-    std::fs::write(folder.path().join("broken.toml"), "profile = ").unwrap();
-    std::fs::write(folder.path().join("note.txt"), "x").unwrap();
-    store.save(&kept(1)).unwrap();
-    let list = store.list().unwrap();
-    assert_eq!(list.len(), 2);
-    assert!(
-        list[0]
-            .1
-            .as_ref()
-            .unwrap_err()
-            .to_string()
-            .contains("broken.toml: line 1")
-    );
-    assert!(matches!(
-        store.find(&kept(1).bound.ids.map(Some)).unwrap(),
-        Found::Fits(..)
-    ));
 }
 
 #[test]
