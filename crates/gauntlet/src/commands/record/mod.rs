@@ -61,14 +61,7 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     } = options.at.open(&tell, clock, interrupt)?;
     complete(options, missing)?;
     let mut hand = hand.map_err(|why| not_calibrated(options, &why))?;
-    if !take_flat(
-        &options.at.glove,
-        &mut hand,
-        &mut scanning,
-        clock,
-        &tell,
-        interrupt,
-    )? {
+    if !take_flat(&mut hand, &mut scanning, clock, &tell, interrupt)? {
         return Err(Failure::interrupted("before anything was recorded").into());
     }
     // A full disk is the writer's to tell.
