@@ -54,10 +54,12 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         }
         let relative = self.config().settings().heading_is_relative;
         let restarted = self.posture.hear(&starts, relative, now);
-        for segment in (0..SEGMENT_COUNT).filter(|k| relative && restarted >> k & 1 == 1) {
-            let seat = usize::from(self.posture.seats()[segment]) % SEGMENT_COUNT;
+        for (segment, seat) in self.posture.seats().into_iter().enumerate() {
+            let starts_of = |starts: &[u16; SEGMENT_COUNT]| starts.get(usize::from(seat)).copied();
+            let of_before = before.as_ref().and_then(starts_of).unwrap_or(0);
             // A first start is none.
-            if before.is_some_and(|before| before[seat] > 0 && before[seat] != starts[seat]) {
+            let is_new = of_before > 0 && starts_of(&starts) != Some(of_before);
+            if relative && is_new && restarted >> segment & 1 == 1 {
                 self.sensors.searching |= 1 << segment;
                 self.tell(now, Kind::HeadingLost { segment });
             }

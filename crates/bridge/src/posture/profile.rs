@@ -57,7 +57,8 @@ impl Posture {
         worn.filter(|worn| self.way == Way::Profile || worn.is_posing())
     }
 
-    /// The segment that the sensor wired as `sensor` sits on.
+    /// The segment that the sensor wired as `sensor` sits on. Out of line: it is asked for in many places of a finding.
+    #[inline(never)]
     pub fn segment_of(&self, sensor: u8) -> u8 {
         let seats = self.seats();
         let segment = seats.iter().position(|&seat| seat == sensor);

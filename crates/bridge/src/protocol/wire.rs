@@ -7,17 +7,19 @@
 //!
 //! The order of variants and fields **is** the format: append only.
 
-use crate::calibration::{self, ProfileState, Try};
+use crate::calibration::{self, Try};
 use crate::clutch::{Epoch, HeartbeatRefusal, Position};
-use crate::store::profile;
 use crate::{CalibrationState, GripperFault, HoldReason, SafeAction, State, filter, store};
 use embedded_storage::nor_flash::NorFlashErrorKind;
-use glove::calibration::{Invalid, Unreadable};
 use glove::hand::Side;
 use glove::{bus, imu, scan};
 use gripper::{Activation, Contact, registers::Fault};
 use hae::image::{self, JointOrder};
 use serde::{Deserialize, Serialize};
+
+mod worn;
+
+pub(super) use worn::{WireProfileError, WireProfileState, pose};
 
 #[derive(Serialize, Deserialize)]
 #[serde(remote = "State", rename_all = "snake_case")]
@@ -135,65 +137,6 @@ enum WireNotCalibrated {
     NoProfile,
     OtherGlove,
     Tilted { segment: u8, by: f32 },
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "ProfileState")]
-pub(super) struct WireProfileState {
-    is_there: bool,
-    fits: bool,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "profile::Error")]
-pub(super) enum WireProfileError {
-    NoStore,
-    NoProfile,
-    Offset {
-        found: usize,
-        expected: usize,
-    },
-    Length {
-        found: usize,
-        expected: usize,
-    },
-    Crc {
-        found: u32,
-        computed: u32,
-    },
-    Unreadable(#[serde(with = "WireUnreadable")] Unreadable),
-    Geometry {
-        slot: usize,
-    },
-    Flash {
-        slot: usize,
-        offset: usize,
-        #[serde(with = "flash_kind")]
-        kind: NorFlashErrorKind,
-    },
-    ReadBack {
-        slot: usize,
-        offset: usize,
-    },
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "Unreadable")]
-enum WireUnreadable {
-    Length(usize),
-    Magic,
-    Version(u8),
-    Crc,
-    Side(u8),
-    Profile(#[serde(with = "WireInvalid")] Invalid),
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(remote = "Invalid")]
-enum WireInvalid {
-    Sensors,
-    Segment(u8),
-    ThumbBase,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -449,41 +392,6 @@ enum WireBusError {
     Unsupported,
     ClockStopped,
     Other,
-}
-
-/// A report that may be missing.
-pub(super) mod pose {
-    use glove::hand::SEGMENT_COUNT;
-    use glove::headings::PoseReport;
-    use serde::{Deserialize, Deserializer, Serialize, Serializer};
-
-    #[derive(Serialize, Deserialize)]
-    struct Wire {
-        found: bool,
-        off: [f32; SEGMENT_COUNT],
-        tilt: [f32; SEGMENT_COUNT],
-        slipped: u16,
-    }
-
-    pub fn serialize<S: Serializer>(report: &Option<PoseReport>, to: S) -> Result<S::Ok, S::Error> {
-        let wire = report.as_ref().map(|report| Wire {
-            found: report.found,
-            off: report.off,
-            tilt: report.tilt,
-            slipped: report.slipped,
-        });
-        wire.serialize(to)
-    }
-
-    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<PoseReport>, D::Error> {
-        let wire = Option::<Wire>::deserialize(from)?;
-        Ok(wire.map(|wire| PoseReport {
-            found: wire.found,
-            off: wire.off,
-            tilt: wire.tilt,
-            slipped: wire.slipped,
-        }))
-    }
 }
 
 /// The kind of a flash error as one number: the outside crate's type is open-ended.

@@ -246,8 +246,14 @@ impl Get<'_> {
         }
     }
 
+    /// Out of line: some 400 numbers are taken.
+    #[inline(never)]
+    fn number(&mut self) -> f32 {
+        f32::from_le_bytes(self.bytes())
+    }
+
     fn numbers<const N: usize>(&mut self) -> [f32; N] {
-        core::array::from_fn(|_| f32::from_le_bytes(self.bytes()))
+        core::array::from_fn(|_| self.number())
     }
 
     fn rotation(&mut self) -> Quaternion {

@@ -286,7 +286,8 @@ impl FlatHand {
         // From 2: the thumb's metacarpal is not judged, and the hand hangs on nothing.
         for k in 2..SEGMENT_COUNT {
             let on = parent(k).unwrap_or(0);
-            if self.tracks[k].first.is_none() || self.tracks[on].first.is_none() {
+            let is_seen = |k: usize| self.tracks.get(k).is_some_and(|t| t.first.is_some());
+            if !(is_seen(k) && is_seen(on)) {
                 continue;
             }
             // The thumb's base lies otherwise than the hand.

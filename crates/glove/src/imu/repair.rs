@@ -6,17 +6,21 @@ use crate::hand::Quaternion;
 /// The largest count a component of a unit quaternion has, 1.
 const ONE: i16 = 16_384;
 
+/// Squared norm of bytes that are unit but for rounding: 16385.5 counts. A component of 16383 or less that was flipped makes more.
+const UNIT: i64 = 268_484_610;
+
 /// Bytes whose bit 15 of one component is flipped, with the bit put back; others as they are. True if something was repaired.
 ///
 /// A component of a unit quaternion is at most 16384 counts, and the flip moves it by 32768: it always leaves that range. Two of
-/// them outside are not repaired: the norm refuses them.
+/// them outside are not repaired: the norm refuses them. Neither is one that is outside by a count of rounding: then the bytes are
+/// unit as they are, and with the bit changed they would be the opposite of a small turn.
 pub fn repaired(raw: [u8; SAMPLE_BYTES]) -> ([u8; SAMPLE_BYTES], bool) {
     let outside = |pair: &[u8]| match pair {
         [low, high] => !(-ONE..=ONE).contains(&i16::from_le_bytes([*low, *high])),
         _ => false,
     };
     let mut mended = raw;
-    if raw.chunks(2).filter(|pair| outside(pair)).count() != 1 {
+    if raw.chunks(2).filter(|pair| outside(pair)).count() != 1 || squared(&raw) <= UNIT {
         return (raw, false);
     }
     for pair in mended.chunks_mut(2) {
@@ -33,12 +37,15 @@ pub fn repaired(raw: [u8; SAMPLE_BYTES]) -> ([u8; SAMPLE_BYTES], bool) {
     }
 }
 
+/// Squared norm in counts.
+fn squared(raw: &[u8; SAMPLE_BYTES]) -> i64 {
+    let squares = super::counts(raw).map(|count| i64::from(count) * i64::from(count));
+    squares.iter().sum()
+}
+
 /// The orientation in bytes that a repair may have touched: norm within 1 ± 0.01.
 pub(crate) fn orientation(raw: &[u8; SAMPLE_BYTES]) -> Result<Quaternion, Fault> {
-    let squared: i64 = super::counts(raw)
-        .map(|count| i64::from(count) * i64::from(count))
-        .iter()
-        .sum();
+    let squared = squared(raw);
     const LOW: i64 = 16_220 * 16_220;
     const HIGH: i64 = 16_548 * 16_548;
     match super::orientation(raw) {
@@ -57,6 +64,18 @@ mod tests {
             pair.copy_from_slice(&count.to_le_bytes());
         }
         raw
+    }
+
+    #[test]
+    fn a_component_beyond_one_by_a_count_of_rounding_is_left_as_it_is() {
+        for clean in [[16_385, 0, 0, 0], [16_385, 57, -1, 0], [0, 1, -16_385, 100]] {
+            let raw = bytes(clean);
+            assert_eq!(repaired(raw), (raw, false), "{clean:?}");
+        }
+        let raw = bytes([16_383, 150, 100, 0]);
+        let mut flipped = raw;
+        flipped[1] ^= 0x80;
+        assert_eq!(repaired(flipped), (raw, true));
     }
 
     #[test]

@@ -7,18 +7,15 @@ use bridge::Epoch;
 use bridge::HoldReason;
 use bridge::calibration::{CalibrationState, Refusal, Try};
 use bridge::clutch::{HeartbeatRefusal, Position};
-use bridge::event::{Kind, Request};
 use bridge::protocol;
 use bridge::protocol::message::{Counters, Sample, Status};
-use glove::calibration::Bound;
 
 use super::axes::Axes;
-use super::calibrating::told;
+use super::chip_calibrating::Trying;
 use super::chip_devices::Told;
 use super::chip_stop::{Known, renew, stop};
-use super::hub::{Happened, Hub};
+use super::hub::Hub;
 use super::orders::{Order, Queue};
-use super::record::Sort;
 use super::snapshot::Snapshot;
 use super::stopped::Stopped;
 use super::totals::Totals;
@@ -50,22 +47,12 @@ pub(super) struct Left {
     pub fault: Option<Error>,
 }
 
-/// A calibration that is tried as often as it takes.
-#[derive(Debug, Clone, Copy)]
-struct Trying {
-    until: Instant,
-    /// Sensors that sit straight; else the headings by the profile.
-    is_straight: bool,
-    /// Tries that had ended when the newest began.
-    ended: u16,
-}
-
 /// The thread.
 #[derive(Debug)]
 pub(super) struct Worker {
-    link: HostLink,
+    pub(super) link: HostLink,
     orders: Queue,
-    hub: Hub,
+    pub(super) hub: Hub,
     samples: Option<SyncSender<Sample>>,
     /// Of the closing that is kept.
     epoch: Option<Epoch>,
@@ -81,10 +68,10 @@ pub(super) struct Worker {
     asked_status: Option<Instant>,
     sample: Option<Sample>,
     devices: Told,
-    calibration: CalibrationState,
+    pub(super) calibration: CalibrationState,
     /// The bridge has said so.
-    calibration_known: bool,
-    trying: Option<Trying>,
+    pub(super) calibration_known: bool,
+    pub(super) trying: Option<Trying>,
     counted: (Instant, Counters),
     useless: bool,
 }
@@ -264,34 +251,6 @@ impl Worker {
         Ok(())
     }
 
-    fn begin_try(&mut self, wait: gripper::Duration, is_straight: bool) -> Result<(), Error> {
-        let ended = self.link.health()?.calibration.ended;
-        calibrate(&mut self.link, is_straight)?;
-        self.trying = Some(Trying {
-            until: Instant::now() + Duration::from_micros(wait.as_micros()),
-            is_straight,
-            ended,
-        });
-        self.calibration.newest = Try::Waiting;
-        Ok(())
-    }
-
-    /// Another profile, kept by the bridge; refused while the clutch is closed.
-    fn set_profile(&mut self, profile: Option<&Bound>) -> Result<(), Error> {
-        match self.link.set_profile(profile) {
-            Err(Error::Refused(protocol::message::Refusal::Engaged)) => {
-                let kind = Kind::Refused(Request::Profile);
-                self.hub.lock().happened(Happened {
-                    sort: Sort::Fault,
-                    text: kind.to_string(),
-                    kind,
-                });
-                Ok(())
-            }
-            done => done,
-        }
-    }
-
     fn heartbeat(&mut self, epoch: Epoch) -> Result<(), Error> {
         match self.link.heartbeat(epoch)? {
             Heartbeat::Kept(status) => {
@@ -332,48 +291,6 @@ impl Worker {
         (self.status, self.missed, self.asked_status) = (status, 0, Some(Instant::now()));
         self.look_at_calibration(end)?;
         Ok(true)
-    }
-
-    fn look_at_calibration(&mut self, end: Instant) -> Result<(), Error> {
-        let now = match self.link.health_by(end) {
-            // That of an older bridge, which only watches and is flashed, is not known.
-            Err(Error::Older { .. }) => return Ok(()),
-            health => match health? {
-                Some(health) => health.calibration,
-                None => return Ok(()),
-            },
-        };
-        self.calibration_known = true;
-        let Some(trying) = &mut self.trying else {
-            self.calibration.is_calibrated = now.is_calibrated;
-            return Ok(());
-        };
-        match now.newest {
-            _ if now.ended == trying.ended => {}
-            Try::Refused(why) if Instant::now() < trying.until && may_come(why) => {
-                trying.ended = now.ended;
-                calibrate(&mut self.link, trying.is_straight)?;
-            }
-            newest => {
-                self.trying = None;
-                self.calibration.is_calibrated = now.is_calibrated;
-                self.calibrated(newest);
-            }
-        }
-        Ok(())
-    }
-
-    /// A try ended, for this session's watchers.
-    fn calibrated(&mut self, newest: Try) {
-        self.calibration.newest = newest;
-        self.calibration.ended = self.calibration.ended.wrapping_add(1);
-        let kind = Kind::Calibration(newest);
-        self.hub.lock().happened(Happened {
-            // A hand that was not taken is no fault of a device.
-            sort: Sort::Note,
-            text: told(&kind, &self.calibration),
-            kind,
-        });
     }
 
     /// Once a second, and when a run began, where the answer comes by `end`, when the next heartbeat is due.
@@ -458,19 +375,4 @@ impl Worker {
         };
         self.hub.lock().say(seen, self.useless);
     }
-}
-
-fn calibrate(link: &mut HostLink, is_straight: bool) -> Result<(), Error> {
-    match is_straight {
-        true => link.calibrate_straight(),
-        false => link.calibrate_flat_hand(),
-    }
-}
-
-/// Whether what was refused so may be taken when it is tried again.
-fn may_come(why: Refusal) -> bool {
-    !matches!(
-        why,
-        Refusal::Engaged | Refusal::NoProfile | Refusal::OtherGlove
-    )
 }

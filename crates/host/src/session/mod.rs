@@ -15,6 +15,7 @@ use crate::realtime::Scheduling;
 
 pub mod axes;
 mod calibrating;
+mod chip_calibrating;
 mod chip_devices;
 mod chip_stop;
 mod chip_worker;

@@ -6,12 +6,13 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::{Duration, Instant};
 
-use bridge::calibration::{CalibrationState, Try};
+use bridge::calibration::{CalibrationState, ProfileState, Try};
 use bridge::clutch::{HeartbeatRefusal, Position};
 use bridge::protocol::frame::{self, Decoder};
 use bridge::protocol::message::{
-    Answer, AxisDetail, Call, Counters, Devices, FromBridge, GripperDetail, GripperStatus, Health,
-    Hello, PerAxis, Refusal, Replies, Reply, Request, Restart, Sample, Status, VERSION,
+    Answer, AxisDetail, Call, Counters, Devices, FromBridge, GripperDetail, GripperStatus,
+    Headings, Health, Hello, PerAxis, Refusal, Replies, Reply, Request, Restart, Sample, Status,
+    VERSION,
 };
 use bridge::{Epoch, HoldReason, State};
 use gripper::{Activation, Contact, Fault};
@@ -155,7 +156,12 @@ impl Script {
         }
         if !matches!(
             call,
-            Call::Heartbeat { .. } | Call::Status | Call::Counters | Call::Health | Call::Devices
+            Call::Heartbeat { .. }
+                | Call::Status
+                | Call::Counters
+                | Call::Health
+                | Call::Devices
+                | Call::Headings
         ) {
             self.calls.push(name);
         }
@@ -196,6 +202,16 @@ impl Script {
             }
             Call::Health => Answer::Health(self.health()),
             Call::Devices => Answer::Devices(self.devices()),
+            Call::Headings => Answer::Headings(Headings {
+                profile: ProfileState::default(),
+                sigma: [0.0; 16],
+                drift: [0.0; 16],
+                degraded: 0,
+                unknown: 0,
+                held: 0,
+                poses: 0,
+                pose: None,
+            }),
             _ => Answer::Done,
         })
     }

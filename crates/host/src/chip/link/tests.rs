@@ -436,3 +436,49 @@ fn counters_that_do_not_come_cost_no_heartbeat() {
     let names: Vec<&str> = heard.iter().map(|(_, name)| name.as_str()).collect();
     assert_eq!(names, ["Hello", "Counters", "Heartbeat"], "asked once");
 }
+
+#[test]
+fn a_profile_goes_over_in_chunks_and_comes_back_part_by_part() {
+    let bound = glove::calibration::Bound {
+        profile: glove::calibration::Profile::straight(glove::hand::Side::Left),
+        ids: std::array::from_fn(|k| [k as u8; 16]),
+    };
+    let bytes = bound.to_bytes();
+    let part = |offset: usize| {
+        let rest = &bytes[offset..(offset + 256).min(bytes.len())];
+        Do::Answer(Ok(Answer::Profile(
+            bridge::protocol::message::ProfilePart {
+                length: bytes.len() as u16,
+                offset: offset as u16,
+                bytes: rest.iter().copied().collect(),
+            },
+        )))
+    };
+    let none = Refusal::Profile(bridge::store::profile::Error::NoProfile);
+    let script = vec![
+        hello(),
+        received(512),
+        received(748),
+        Do::Answer(Ok(Answer::Done)),
+        part(0),
+        part(256),
+        part(512),
+        Do::Answer(Ok(Answer::Done)),
+        Do::Answer(Err(none)),
+    ];
+    let (back, heard) = talk(script, |address| {
+        let mut link = HostLink::connect(address)?;
+        link.set_profile(Some(&bound))?;
+        let back = link.profile()?;
+        link.set_profile(None)?;
+        assert_eq!(link.profile()?, None);
+        Ok::<_, Error>(back)
+    });
+    assert_eq!(back.expect("answers"), Some(bound));
+    let names: Vec<&str> = heard.iter().map(|(_, name)| name.as_str()).collect();
+    assert_eq!(
+        names[1..4],
+        ["ProfileChunk", "ProfileChunk", "ProfileCommit"]
+    );
+    assert_eq!(names[7], "ProfileErase");
+}
