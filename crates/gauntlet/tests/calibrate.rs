@@ -161,8 +161,12 @@ fn a_left_glove_that_is_said_to_be_right_is_not_kept_and_on_a_terminal_the_sessi
     };
     until(&terminal, "press the space bar");
     terminal.keys(b" ");
-    until(&terminal, "get ready");
-    until(&terminal, "Lay your hand flat");
+    // What is drawn over what stood there is not whole: all of it anew.
+    let mut view = terminal.redrawn();
+    while !view.contains("Lay your hand flat") {
+        assert!(Instant::now() < end, "no step came: {view}");
+        view = terminal.redrawn();
+    }
     terminal.keys(b"q");
     assert_eq!(wait(&mut terminal.child).code(), Some(1));
     assert!(terminal.seen().contains("nothing was written"));

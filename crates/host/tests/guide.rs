@@ -45,6 +45,11 @@ fn task(step: Step) -> Task {
     }
 }
 
+/// Something that happens to the glove.
+type Happens = Box<dyn FnOnce(&VirtualGlove, Instant)>;
+/// Whether a remark is the expected one.
+type Expected = fn(Remark) -> bool;
+
 struct Bench {
     glove: VirtualGlove,
     person: Shared,
@@ -57,7 +62,7 @@ struct Bench {
     /// Steps that the person does not do when first asked.
     ignores: Vec<Step>,
     /// What happens when a step is asked for.
-    on: Vec<(Step, Box<dyn FnOnce(&VirtualGlove, Instant)>)>,
+    on: Vec<(Step, Happens)>,
     /// The glove gives nothing between these.
     silent: [f64; 2],
 }
@@ -261,7 +266,7 @@ fn each_step_comes_with_a_countdown_and_the_turn_says_where_to() {
 
 #[test]
 fn what_the_person_missed_is_named_and_asked_again_and_then_it_is_good() {
-    let missed: [(Step, fn(Remark) -> bool); 5] = [
+    let missed: [(Step, Expected); 5] = [
         (
             Step::Turn,
             |r| matches!(r, Remark::TurnFurther(ratio) if ratio > 0.9),
@@ -283,7 +288,7 @@ fn what_the_person_missed_is_named_and_asked_again_and_then_it_is_good() {
         assert!(expected(again[0].1), "{step:?}: {again:?}");
         assert_eq!(bench.told(), Vec::<String>::new(), "{step:?}");
         let text = again[0].1.to_string();
-        let seen = bench.remarks.iter().any(|remark| *remark == text);
+        let seen = bench.remarks.contains(&text);
         assert!(seen, "it stands there while it is done again: {text}");
     }
 }

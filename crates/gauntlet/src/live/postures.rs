@@ -17,11 +17,11 @@ const FLAT: &str = "\
              table";
 
 const THUMB_UP: &str = "\
- from the fingertips
+ from the fingertips (right hand)
 
           ║  thumb
          ┌╨┐
-    palm │ │ back
+    back │ │ palm
          │ │
          └─┘";
 

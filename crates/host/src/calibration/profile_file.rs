@@ -105,8 +105,8 @@ impl Kept {
         };
         let mut text = format!(
             "\
-# A glove on a hand, measured by `gauntlet calibrate`. It holds as long as no sensor is moved on the glove.
-# Of its numbers none may be changed by hand: `crc` tells.
+# A glove on a hand, measured by gauntlet calibrate. It holds as long as no sensor is moved on the glove.
+# Of its numbers none may be changed by hand: crc tells.
 profile = {VERSION}
 calibrated = {}
 hand = \"{hand}\"

@@ -45,8 +45,8 @@ The profile goes into a file bound to the sensors' unique ids, where `teleop` fi
 It is written when every check holds or leaves doubts; what is bad is not, but with --keep-anyway. \
 A virtual glove's person does what is asked by itself (`gauntlet simulate`). Exit code 1 where nothing is kept.")]
 pub struct Calibrate {
-    /// The glove's serial port.
-    #[arg(long, value_name = "PORT", required_unless_present = "list")]
+    /// The glove's serial port; needed but for --list.
+    #[arg(long, value_name = "PORT")]
     pub glove: Option<PathBuf>,
     /// Which hand should wear it; a glove that turns out to be on the other one is refused.
     #[arg(long, value_enum)]
@@ -83,7 +83,11 @@ pub(crate) fn run(options: &Calibrate, interrupt: &Interrupt) -> Result<()> {
         _ if options.list => list::run(options.json),
         Some(glove) if options.flat => flat::run(options, glove, interrupt),
         Some(glove) => guided(options, glove, interrupt),
-        None => Err(Failure::usage("no glove is named", "--glove PORT").into()),
+        None => Err(Failure::usage(
+            "no glove is named",
+            advice("--glove PORT; ").then(Command::gauntlet("ports").then(" lists them")),
+        )
+        .into()),
     }
 }
 
@@ -225,7 +229,7 @@ fn next(glove: &Path) -> NextStep {
     Command::gauntlet("record")
         .path("--glove", glove)
         .option("--out", "my_hand.csv")
-        .then(" records the hand for `train`")
+        .then(" records the hand, to train a map on")
 }
 
 /// Whether it is kept. `agreed`: the person saw the verdict and wants it.

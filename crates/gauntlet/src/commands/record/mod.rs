@@ -219,8 +219,10 @@ fn complete(options: &Record, missing: usize) -> Result<()> {
 
 fn not_calibrated(options: &Record, why: &str) -> Failure {
     let place = options.at.glove.display();
-    let next = NextStep::same(Command::more().word("--ideal"))
-        .then(", for a virtual glove whose sensors sit straight");
+    let next = Command::gauntlet("calibrate")
+        .path("--glove", &options.at.glove)
+        .then(", and then the same again; for a virtual glove whose sensors sit straight ")
+        .then(NextStep::same(Command::more().word("--ideal")));
     Failure::new(
         format!("the glove on {place} is not calibrated: {why}"),
         next,

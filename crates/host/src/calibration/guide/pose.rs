@@ -6,9 +6,10 @@ use glove::headings::{Config, FLAT_FOR, Headings, NotFlat, PoseReport};
 use glove::scan::Frame;
 use glove::{Duration, Instant};
 
+use super::Remark;
 use super::judged::Finding;
+use super::judging::{FLAT_SCANS, STILL};
 use super::watch::Watch;
-use super::{Remark, STILL};
 use crate::calibration::report::word;
 use crate::clock::since;
 
@@ -99,7 +100,7 @@ impl FlatPose {
     }
 
     fn end(&mut self, now: Instant) -> PoseEnd {
-        if self.watch.scans < super::FLAT_SCANS {
+        if self.watch.scans < FLAT_SCANS {
             return PoseEnd::Moved(Remark::FewScans(self.watch.scans));
         }
         if let Some(k) = self.watch.unsteady(STILL) {
