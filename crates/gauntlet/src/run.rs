@@ -371,6 +371,11 @@ impl Run {
         self.session.set_profile(profile);
     }
 
+    /// Whether the glove's sensors sit straight and share a heading; else the bridge knows how they sit, or nobody does.
+    pub fn is_straight(&mut self, straight: bool) {
+        self.straight = straight;
+    }
+
     /// Who lies flat when that is asked for.
     pub fn has(&mut self, person: Option<Listener>) {
         self.person = person;

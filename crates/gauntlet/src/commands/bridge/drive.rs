@@ -14,6 +14,7 @@ use crate::outputs;
 use crate::results::{self, devices, runs};
 use crate::run::{Finished, Options, Run};
 use crate::tell::Tell;
+use host::calibration::Kept;
 use host::chip::link::HostLink;
 use host::clock::Clock;
 use host::failure::{Failure, with_others};
@@ -21,9 +22,16 @@ use host::interrupt::Interrupt;
 use host::recording::poses::PosesFile;
 use host::session::{Devices, OnChip, refused};
 
+/// A flat pose.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Flat {
+    /// Of sensors that sit straight and share a heading.
+    pub ideal: bool,
+}
+
 pub(super) fn engage(
     at: &BridgeAt,
-    calibrate: bool,
+    flat: Option<Flat>,
     activate: bool,
     seconds: Option<Duration>,
     interrupt: &Interrupt,
@@ -33,7 +41,7 @@ pub(super) fn engage(
     // An older bridge is refused before anything moves.
     at.told(link.health())?;
     let mut run = start(link, None, at.devices(), interrupt)?;
-    let ready = ready(&mut run, calibrate, activate, &tell);
+    let ready = ready(&mut run, flat, activate, &tell);
     let began = matches!(ready, Ok(true));
     let driven = ready.and_then(|ready| match ready {
         true => drive(&mut run, "gauntlet bridge engage", seconds, true, at.json),
@@ -50,8 +58,9 @@ pub(super) fn engage(
 }
 
 /// What comes before the clutch may close. Returns whether to go on.
-fn ready(run: &mut Run, calibrate: bool, activate: bool, tell: &Tell) -> Result<bool> {
-    Ok((!calibrate || run.calibrate(tell)?) && (!activate || run.activate(tell)?))
+fn ready(run: &mut Run, flat: Option<Flat>, activate: bool, tell: &Tell) -> Result<bool> {
+    run.is_straight(flat.is_some_and(|flat| flat.ideal));
+    Ok((flat.is_none() || run.calibrate(tell)?) && (!activate || run.activate(tell)?))
 }
 
 /// A run of the bridge behind `link`.
@@ -83,24 +92,42 @@ fn drive(
     run.drive(&options).map(drop)
 }
 
-pub(super) fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
+pub(super) fn undo_calibration(at: &BridgeAt) -> Result<()> {
     let tell = Tell::new(at.json);
     let mut link = at.connect()?;
-    if undo {
-        at.told(link.undo_calibration())?;
-        let health = at.told(link.health())?;
-        if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
-            return Err(refused(why, &at.devices()).into());
-        }
-        tell.say(format_args!("the newest calibration was taken back"));
-        if at.json {
-            return results::print("bridge calibrate", devices::Calibrated { health: &health });
-        }
-        return Ok(());
+    at.told(link.undo_calibration())?;
+    let health = at.told(link.health())?;
+    if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
+        return Err(refused(why, &at.devices()).into());
     }
+    tell.say(format_args!("the newest calibration was taken back"));
+    if at.json {
+        return results::print("bridge calibrate", devices::Calibrated { health: &health });
+    }
+    Ok(())
+}
+
+pub(super) fn calibrate(
+    at: &BridgeAt,
+    profile: Option<&Path>,
+    flat: Flat,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let tell = Tell::new(at.json);
+    let profile = profile.map(|path| Kept::read(path).map(|kept| (path, kept)));
+    let profile = profile.transpose()?;
+    let mut link = at.connect()?;
     // An older bridge is refused by name.
     let health = at.told(link.health())?;
+    if let Some((path, kept)) = &profile {
+        at.told(link.set_profile(Some(&kept.bound)))?;
+        tell.say(format_args!(
+            "profile    {}  is kept by the bridge",
+            path.display()
+        ));
+    }
     let mut run = start(link, None, at.devices(), interrupt)?;
+    run.is_straight(flat.ideal);
     let taken = run.calibrate(&tell).and_then(|taken| match taken {
         true => Ok(()),
         false => Err(Failure::interrupted("before the hand was taken").into()),
