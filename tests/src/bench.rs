@@ -1,7 +1,8 @@
 //! A glove and a gripper on byte-timed wires and one virtual clock, and a weights store that holds a map.
 
 use crate::nor_slot::NorSlot;
-use bridge::WeightsStore;
+use bridge::{Board, Instant, Platform, WeightsStore};
+use gripper::driver::ThreeFinger;
 use rig::glove::VirtualGlove;
 use rig::gripper::{Family, VirtualGripper};
 use rig::{Clock, MemoryWire};
@@ -31,8 +32,13 @@ impl Devices {
 
     /// The same with a gripper of this family.
     pub fn with(pose: impl Fn(f64) -> [f32; 25] + Send + 'static, family: Family) -> Self {
-        let clock = Clock::new();
         let glove = VirtualGlove::new(Box::new(pose), rig::glove::Config::at_baud(BAUD));
+        Self::wearing(glove, family)
+    }
+
+    /// The same with this glove.
+    pub fn wearing(glove: VirtualGlove, family: Family) -> Self {
+        let clock = Clock::new();
         let gripper = VirtualGripper::new(rig::gripper::Config::of(family));
         Self {
             glove_wire: MemoryWire::new(&clock, glove.clone(), BAUD),
@@ -42,6 +48,26 @@ impl Devices {
             gripper,
         }
     }
+}
+
+/// What a bridge between such devices stands on: time goes to the next event.
+pub struct Machine(pub Clock);
+
+impl Platform for Machine {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        let soonest = Instant::from_ticks(self.0.now().as_ticks() + 1);
+        self.0.wait_until(due.max(soonest));
+    }
+}
+
+impl Board<4> for Machine {
+    type Glove = glove::sc18im::Sc18im<MemoryWire>;
+    type Gripper = ThreeFinger<MemoryWire>;
+    type Flash = NorSlot;
 }
 
 /// A store that holds `image`, a sound one for four axes.

@@ -1,18 +1,17 @@
 //! From a shown hand to a standing gripper, through every byte: the tool's training, the weights store, the virtual
 //! sensors behind the serial bridge, the map, the supervisor, Modbus, the virtual gripper's own fingers.
 
-use bridge::{App, Board, Config, Instant, Platform, State};
+use bridge::{App, Config, Instant, Platform, State};
 use glove::hand::LIMITS;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
 use host::interrupt::Interrupt;
 use host::training::motion::Motion;
 use host::training::{Request, train};
-use loop_tests::bench::{self, Devices};
-use loop_tests::nor_slot::NorSlot;
+use loop_tests::bench::{self, Devices, Machine};
+use rig::Clock;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
-use rig::{Clock, MemoryWire};
 use trainer::algorithm::Schedule;
 use trainer::hand::motion::Generator;
 
@@ -24,25 +23,6 @@ const SETTLE: u64 = 5_000_000;
 
 /// A hand closes in this time, seconds.
 const MOVE_S: f64 = 0.4;
-
-struct Machine(Clock);
-
-impl Platform for Machine {
-    fn now(&mut self) -> Instant {
-        self.0.now()
-    }
-
-    fn wait_until(&mut self, due: Instant) {
-        let soonest = Instant::from_ticks(self.0.now().as_ticks() + 1);
-        self.0.wait_until(due.max(soonest));
-    }
-}
-
-impl Board<4> for Machine {
-    type Glove = glove::sc18im::Sc18im<MemoryWire>;
-    type Gripper = ThreeFinger<MemoryWire>;
-    type Flash = NorSlot;
-}
 
 type Bridge = App<Machine, 4>;
 

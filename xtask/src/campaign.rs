@@ -22,17 +22,27 @@ pub fn gripper() -> Result<(), Failure> {
 }
 
 /// The glove's: ten minutes of 24 virtual persons in honest gloves, in each attitude; the checks on 600 correct sessions, all 120
-/// swapped pairs and 144 slips.
+/// swapped pairs and 144 slips; and ten persons whose open hands and fists move the gripper.
 pub fn glove() -> Result<(), Failure> {
+    ignored("glove campaigns", "glove", "honest_glove")?;
+    ignored(
+        "open hands and fists",
+        "loop-tests",
+        "honest_hand_moves_the_gripper",
+    )
+}
+
+/// The ignored tests of one file, one after another.
+fn ignored(title: &'static str, package: &str, test: &str) -> Result<(), Failure> {
     step::run(
-        "glove campaigns",
+        title,
         &mut cargo(&[
             "test",
             "--locked",
             "--package",
-            "glove",
+            package,
             "--test",
-            "honest_glove",
+            test,
             "--",
             "--ignored",
             "--nocapture",

@@ -6,6 +6,7 @@
 //! | [`out`], [`tell`], [`progress`] | what a person reads |
 //! | [`results`] | what a program reads (`--json`) |
 //! | [`reading`], [`outputs`], [`played`] | files that are read, files that may be written over, motion that is played |
+//! | [`wearer`] | the virtual person in an honest virtual glove, calibrated on the virtual clock |
 //! | [`run`], [`live`] | a run as a person sees it, of a bridge in this process or on a chip |
 //!
 //! Everything that another program could use is in [`host`].
@@ -24,3 +25,4 @@ pub mod reading;
 pub mod results;
 pub mod run;
 pub mod tell;
+pub mod wearer;

@@ -13,9 +13,11 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use bridge::event::Kind;
 use glove::calibration::Bound;
+use glove::calibration::Step;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::live::{Key, Live};
+use crate::wearer::Listener;
 use crate::{note, out};
 use clutch::Clutch;
 use host::clock::Clock;
@@ -109,6 +111,10 @@ pub struct Run {
     activated: bool,
     /// The glove's sensors sit straight and share a heading; else a profile says how they sit.
     straight: bool,
+    /// The virtual person in the glove, who lies flat when asked.
+    person: Option<Listener>,
+    /// It was asked to by a key: calibrations that had ended by then.
+    asked_flat: Option<u16>,
 }
 
 impl Run {
@@ -137,6 +143,8 @@ impl Run {
             ending: None,
             activated: false,
             straight: true,
+            person: None,
+            asked_flat: None,
         }
     }
 
@@ -349,7 +357,12 @@ impl Run {
             Key::Open => self.clutch.release(self.session.orders()),
             // One that is not taken says no word of having begun; who pressed it presses it again.
             Key::Calibrate => {
-                self.session.order(self.flat(glove::timing::STILL_WAIT));
+                let before = self.ended();
+                let taken = self.session.order(self.flat(glove::timing::STILL_WAIT));
+                if let Some(person) = self.person.as_ref().filter(|_| taken) {
+                    person.ask(Step::FirstFlat);
+                    self.asked_flat = Some(before);
+                }
             }
         }
     }
@@ -358,6 +371,21 @@ impl Run {
     pub fn wears(&mut self, profile: Option<Bound>) {
         self.straight = false;
         self.session.set_profile(profile);
+    }
+
+    /// Whether the glove's sensors sit straight and share a heading; else the bridge knows how they sit, or nobody does.
+    pub fn is_straight(&mut self, straight: bool) {
+        self.straight = straight;
+    }
+
+    /// Who lies flat when that is asked for.
+    pub fn has(&mut self, person: Option<Listener>) {
+        self.person = person;
+    }
+
+    fn ended(&self) -> u16 {
+        let seen = self.session.snapshot();
+        seen.map_or(0, |seen| seen.calibration.ended)
     }
 
     /// The order to take the flat hand within `wait`.
@@ -387,6 +415,10 @@ impl Run {
         self.clutch.look(&*self.session);
         self.look_at_file_limit();
         self.look_at_events();
+        if self.asked_flat.is_some_and(|before| self.ended() != before) {
+            self.asked_flat = None;
+            self.person.iter().for_each(Listener::let_go);
+        }
         Ok(())
     }
 

@@ -32,7 +32,7 @@ fn json(output: &Output) -> serde_json::Value {
 
 #[test]
 fn a_person_is_calibrated_in_a_minute_and_the_profile_finds_its_glove_from_then_on() {
-    let simulation = Simulation::with(true, Some("gripper"), &["--honest", "7", "--swap", "8,11"]);
+    let simulation = Simulation::with(true, Some("gripper"), &["--seed", "7", "--swap", "8,11"]);
     let config = tempfile::tempdir().unwrap();
     let glove = simulation.glove();
     // Swapped sensors are named, and not taken without a word.
@@ -144,7 +144,7 @@ fn a_person_is_calibrated_in_a_minute_and_the_profile_finds_its_glove_from_then_
 
 #[test]
 fn a_left_glove_that_is_said_to_be_right_is_not_kept_and_on_a_terminal_the_session_can_be_left() {
-    let simulation = Simulation::with(true, None, &["--honest", "3", "--left"]);
+    let simulation = Simulation::with(true, None, &["--seed", "3", "--left"]);
     let config = tempfile::tempdir().unwrap();
     let glove = simulation.glove();
     let mut terminal = Terminal::start(&["calibrate", "--glove", &glove]);

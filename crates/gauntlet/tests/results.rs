@@ -175,6 +175,23 @@ fn log() -> Written {
 fn results_of_runs_keep_their_names() {
     let (summary, log, quality, flashed) = (summary(), log(), quality(), flashed());
     let error = Failure::new("the glove no longer sends frames", "its cable").into();
+    let person = runs::Person {
+        seed: 1,
+        calibration: host::calibration::profile_file::Quality {
+            verdict: "good".to_owned(),
+            fit_deg: 3.1,
+            ratio: 0.58,
+            tilt_deg: 4.2,
+            heading_deg: 2.5,
+            findings: Vec::new(),
+        },
+        joints_good: Some(15),
+        joints: Some(15),
+        repeated: Some(0),
+        session_s: Some(57.6),
+        took_s: Some(1.2),
+        error: Some(gauntlet::wearer::Fit::default()),
+    };
     let run = || runs::Run {
         gripper: Some(Stopped::Held),
         run: &summary,
@@ -191,6 +208,7 @@ fn results_of_runs_keep_their_names() {
         epochs: 1_000,
         pairs: 10,
         quality: &quality,
+        person: Some(&person),
         flash: Some(&flashed),
         run: run(),
     };

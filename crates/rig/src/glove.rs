@@ -167,7 +167,10 @@ impl VirtualGlove {
         };
         let mut bus = Bus::new(config.power_on);
         for (index, chip) in bus.sensors.iter_mut().enumerate() {
-            chip.flips = hand.honest.as_ref().map(|worn| worn.flips(index));
+            if let Some(worn) = &hand.honest {
+                chip.flips = Some(worn.flips(index));
+                chip.belong_to(worn.ids());
+            }
         }
         let state = State {
             bridge: Sc18im::new(config.chip, config.baud, config.power_on),

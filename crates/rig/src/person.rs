@@ -17,11 +17,13 @@
 
 mod attitude;
 mod motion;
+mod playing;
 mod session;
 
 use crate::PoseSource;
 use crate::chance::{Chance, smooth};
 
+pub use playing::Playing;
 pub use session::{Prompt, guided};
 
 /// Who the person is. Angles in degrees, times in seconds.
@@ -95,7 +97,7 @@ pub const LATEST_S: f64 = 0.7;
 pub const MOVE_S: f64 = 0.8;
 
 /// How the hand is held in use.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Attitude {
     /// Palm down, rolling and pitching by up to 30°.
     PalmDown,
@@ -103,6 +105,14 @@ pub enum Attitude {
     ThumbUp,
     /// Any way.
     Free,
+    /// Rolled about the forearm (90: the thumb of a right hand up) and pitched (−80: the fingers down, 80: up) by so many degrees from
+    /// palm down, within 6°.
+    Steady {
+        /// About the forearm.
+        roll: f64,
+        /// Of the fingers above the wrist.
+        pitch: f64,
+    },
 }
 
 /// What a person can be asked to do.
@@ -124,6 +134,8 @@ pub enum Task {
     Use(Attitude),
     /// This posture (25 angles, radians, in the order of `glove::hand::JOINT_NAMES`), palm down; as exact as the person is.
     Posture([f64; 25]),
+    /// The same with the hand held so.
+    Held([f64; 25], Attitude),
 }
 
 /// Something that was asked, and when the person begins it.

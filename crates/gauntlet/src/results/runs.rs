@@ -4,11 +4,14 @@ use std::path::Path;
 
 use serde::Serialize;
 
+use host::calibration::profile_file::Quality as Calibration;
 use host::chip::link::Flashed;
 use host::failure::Told;
 use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::training::quality::Quality;
+
+use crate::wearer::Fit;
 
 /// What is left of a run: `teleop`, `bridge engage`, `bridge monitor`, `bridge log`.
 #[derive(Debug, Serialize)]
@@ -47,9 +50,32 @@ pub struct Demo<'a> {
     pub pairs: usize,
     /// How good the map is.
     pub quality: &'a Quality,
-    /// How it came into the chip; `null` in this process.
+    /// The virtual person in the glove; `null` with ideal sensors.
+    pub person: Option<&'a Person>,
+    /// How the map came into the chip; `null` in this process.
     pub flash: Option<&'a Flashed>,
     /// The run.
     #[serde(flatten)]
     pub run: Run<'a>,
+}
+
+/// A demo's virtual person, and how the calibration of its glove came out.
+#[derive(Debug, Serialize)]
+pub struct Person {
+    /// Everything about the person and the glove follows from it.
+    pub seed: u64,
+    /// How well it is calibrated.
+    pub calibration: Calibration,
+    /// Joints on which every check holds; `null` with a profile from a file, as all below.
+    pub joints_good: Option<usize>,
+    /// Joints.
+    pub joints: Option<usize>,
+    /// Steps of the session that were asked for again.
+    pub repeated: Option<usize>,
+    /// How long the session took the person, s.
+    pub session_s: Option<f64>,
+    /// How long it took here, s.
+    pub took_s: Option<f64>,
+    /// How far angles were then from the truth, degrees; `null` where the session was shown in real time, too.
+    pub error: Option<Fit>,
 }

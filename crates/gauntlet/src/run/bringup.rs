@@ -8,10 +8,10 @@ use glove::calibration::Step;
 
 use super::Run;
 use crate::tell::Tell;
+use crate::wearer::Listener;
 use gripper::Activation;
-use host::calibration::virtual_person::VirtualPerson;
 use host::failure::Failure;
-use host::session::{Devices, Order, Snapshot, kept, refused};
+use host::session::{Order, Snapshot, kept, refused};
 
 /// For a person to lay the hand flat and hold it still.
 pub const WAIT: Duration = Duration::from_secs(30);
@@ -33,18 +33,19 @@ impl Run {
     /// # Errors
     /// What ended the bridge, or why the hand was not taken.
     pub fn calibrate(&mut self, tell: &Tell) -> Result<bool> {
-        let ended = |run: &Self| {
-            let seen = run.snapshot();
-            seen.map_or(0, |seen| seen.calibration.ended)
-        };
-        let before = ended(self);
+        self.person
+            .iter()
+            .for_each(|person| person.ask(Step::FirstFlat));
+        let taken = self.take_flat(tell);
+        self.person.iter().for_each(Listener::let_go);
+        taken
+    }
+
+    fn take_flat(&mut self, tell: &Tell) -> Result<bool> {
+        let before = self.ended();
         let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
         self.order(self.flat(wait))?;
         tell.say(format_args!("{ASK}"));
-        let person = self.virtual_person();
-        if let Some(person) = &person {
-            person.ask(Step::FirstFlat);
-        }
         let end = Instant::now() + WAIT + ANSWER_WAIT;
         while Instant::now() < end {
             let left = end.saturating_duration_since(Instant::now());
@@ -55,9 +56,6 @@ impl Run {
             if done {
                 break;
             }
-        }
-        if let Some(person) = &person {
-            person.let_go();
         }
         let now = self.session.snapshot().map(|seen| seen.calibration);
         match now.map(|now| now.newest) {
@@ -74,14 +72,6 @@ impl Run {
                 "the same again",
             )
             .into()),
-        }
-    }
-
-    /// Who does what is asked, where the glove is a virtual person's.
-    fn virtual_person(&self) -> Option<VirtualPerson> {
-        match &self.devices {
-            Devices::Here { glove, .. } => VirtualPerson::at(glove),
-            _ => None,
         }
     }
 

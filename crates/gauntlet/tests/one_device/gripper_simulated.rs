@@ -86,7 +86,7 @@ fn words(arguments: &[String]) -> Vec<&str> {
 
 #[test]
 fn teleop_drives_a_gripper_on_the_network_with_a_glove_on_a_serial_port() {
-    let mut simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &[]);
+    let mut simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &["--ideal"]);
     let arguments = teleop(&simulation, &["--seconds", "3", "--json"]);
     let said = json(&run(&words(&arguments)));
     let run = &said["run"];
@@ -104,7 +104,7 @@ fn teleop_drives_a_gripper_on_the_network_with_a_glove_on_a_serial_port() {
 
 #[test]
 fn ctrl_c_holds_a_gripper_on_the_network() {
-    let mut simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &[]);
+    let mut simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &["--ideal"]);
     let arguments = teleop(&simulation, &[]);
     let mut child = start(&words(&arguments));
     let said = until_line(child.stdout.take().unwrap(), "following");
@@ -117,7 +117,7 @@ fn ctrl_c_holds_a_gripper_on_the_network() {
 
 #[test]
 fn a_gripper_that_leaves_the_network_while_it_is_driven_is_told() {
-    let simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &[]);
+    let simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &["--ideal"]);
     let arguments = teleop(&simulation, &[]);
     let mut child = start(&words(&arguments));
     let said = until_line(child.stdout.take().unwrap(), "following");

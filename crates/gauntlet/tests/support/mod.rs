@@ -209,9 +209,10 @@ pub struct Simulation {
 }
 
 impl Simulation {
-    /// Starts it and waits for `ready`.
+    /// Starts it, a glove's sensors sitting straight, and waits for `ready`.
     pub fn start(glove: bool, gripper: bool) -> Self {
-        Self::with(glove, gripper.then_some("gripper"), &[])
+        let ideal: &[&str] = if glove { &["--ideal"] } else { &[] };
+        Self::with(glove, gripper.then_some("gripper"), ideal)
     }
 
     /// The same with the gripper at `gripper`, a link in the folder or an address, and `more` options.

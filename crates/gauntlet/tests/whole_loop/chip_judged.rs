@@ -69,6 +69,7 @@ fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<O
         "--bridge",
         &bridge,
         "--calibrate-flat",
+        "--ideal",
         "--seconds",
     ];
     let mut child = command(&[&["bridge"][..], &words, &[seconds]].concat())

@@ -5,7 +5,7 @@ use bridge::event::Kind;
 
 use super::devices::{Devices, and};
 use crate::failure::Failure;
-use crate::next::NextStep;
+use crate::next::{Command, NextStep, advice};
 
 /// Why the hand was not taken, and what helps.
 pub fn refused(why: Refusal, devices: &Devices) -> Failure {
@@ -73,9 +73,14 @@ fn next(why: Refusal, devices: &Devices) -> NextStep {
         Refusal::Tilted { .. } => {
             "the same again, the palm on a table and the fingers stretched; then the seat of that sensor".into()
         }
-        Refusal::NoProfile | Refusal::OtherGlove => {
-            "calibrating this glove, which makes its profile".into()
-        }
+        Refusal::NoProfile | Refusal::OtherGlove => match devices {
+            Devices::Here { glove, .. } => Command::gauntlet("calibrate")
+                .path("--glove", glove)
+                .then(" makes its profile"),
+            _ => advice("the glove's profile with --profile (")
+                .then(Command::gauntlet("calibrate").word("--list"))
+                .then(" shows where it is), or --ideal for virtual sensors that sit straight"),
+        },
         Refusal::NothingBefore => "calibrating on a flat hand".into(),
     }
 }

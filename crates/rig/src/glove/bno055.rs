@@ -77,6 +77,8 @@ pub(super) struct Faults {
 /// The chip.
 pub(super) struct Bno055 {
     index: usize,
+    /// Gloves of different numbers have sensors with different ids.
+    glove: Option<Chance>,
     pages: [[u8; 128]; 2],
     page: usize,
     pointer: u8,
@@ -99,6 +101,7 @@ impl Bno055 {
     pub fn new(index: usize, now: Instant) -> Self {
         let mut chip = Self {
             index,
+            glove: None,
             pages: [[0; 128]; 2],
             page: 0,
             pointer: 0,
@@ -130,13 +133,8 @@ impl Bno055 {
         let mut page1 = [0u8; 128];
         page1[usize::from(reg::PAGE_ID)] = 1;
         page1[0x08..=0x0B].copy_from_slice(&[0x0D, 0x6D, 0x38, 0x00]);
-        for (i, byte) in page1[usize::from(reg::UNIQUE_ID)..][..16]
-            .iter_mut()
-            .enumerate()
-        {
-            *byte = unique_id_byte(self.index, i);
-        }
         self.pages = [page0, page1];
+        self.write_id();
         self.page = 0;
         self.pointer = 0;
         self.mode = CONFIG;
@@ -148,9 +146,23 @@ impl Bno055 {
     /// Becomes the sensor built as number `built_as`.
     pub fn exchange(&mut self, built_as: usize) {
         self.index = built_as;
+        self.write_id();
+    }
+
+    /// Belongs to a glove whose sensors have ids of their own.
+    pub fn belong_to(&mut self, glove: Chance) {
+        self.glove = Some(glove);
+        self.write_id();
+    }
+
+    fn write_id(&mut self) {
+        let (index, glove) = (self.index, self.glove);
         let id = &mut self.pages[1][usize::from(reg::UNIQUE_ID)..][..16];
         for (i, byte) in id.iter_mut().enumerate() {
-            *byte = unique_id_byte(built_as, i);
+            *byte = match glove {
+                None => unique_id_byte(index, i),
+                Some(glove) => glove.of(index).bits(i as i64) as u8,
+            };
         }
     }
 

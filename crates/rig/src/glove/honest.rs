@@ -11,7 +11,7 @@ type Rotation = UnitQuaternion<f64>;
 /// How honest the glove is: angles in degrees, spreads as standard deviations unless it says "up to".
 #[derive(Debug, Clone, PartialEq)]
 pub struct Honest {
-    /// Everything by chance follows from it: mountings and headings among others, which may be any.
+    /// Everything by chance follows from it: mountings and headings among others, which may be any, and the sensors' unique ids.
     pub seed: u64,
     /// A heading drifts by up to this a minute, each sensor at its own rate …
     pub drift: f64,
@@ -173,6 +173,11 @@ impl Worn {
     /// Seed and share of flipped bits of sensor `sensor`.
     pub fn flips(&self, sensor: usize) -> (Chance, f64) {
         (self.chance.of(600 + sensor), self.honest.flips)
+    }
+
+    /// What the sensors' unique ids follow from: each glove has its own.
+    pub fn ids(&self) -> Chance {
+        self.chance.of(1_100)
     }
 
     /// How far into its 10 ms sensor `sensor` is, as a share.

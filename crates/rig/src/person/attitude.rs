@@ -48,15 +48,18 @@ impl Person {
             Task::Fists => held(roam(1, 60.0, 2.0), roam(2, 40.0, 2.0), yaw),
             Task::Thumb => held(roam(1, 15.0, 1.5), roam(2, 15.0, 1.5), yaw),
             Task::Free => held(roam(1, 40.0, 1.5), roam(2, 40.0, 1.5), yaw),
-            Task::Use(Attitude::PalmDown) => held(roam(1, 30.0, 2.0), roam(2, 30.0, 2.0), yaw),
-            Task::Use(Attitude::ThumbUp) => {
-                held(thumb_up + roam(1, 12.0, 2.0), roam(2, 12.0, 2.0), yaw)
-            }
-            Task::Use(Attitude::Free) => held(
-                roam(3, 180.0, 2.5),
-                roam(4, 180.0, 2.5),
-                roam(5, 180.0, 4.0),
-            ),
+            Task::Use(attitude) | Task::Held(_, attitude) => match attitude {
+                Attitude::PalmDown => held(roam(1, 30.0, 2.0), roam(2, 30.0, 2.0), yaw),
+                Attitude::ThumbUp => held(thumb_up + roam(1, 12.0, 2.0), roam(2, 12.0, 2.0), yaw),
+                Attitude::Free => held(
+                    roam(3, 180.0, 2.5),
+                    roam(4, 180.0, 2.5),
+                    roam(5, 180.0, 4.0),
+                ),
+                Attitude::Steady { roll, pitch } => {
+                    held(roll + roam(1, 6.0, 1.5), pitch + roam(2, 6.0, 1.5), yaw)
+                }
+            },
         }
     }
 

@@ -68,7 +68,7 @@ impl Person {
                     angles[j] += amount * much(j) * across;
                 }
             }
-            Task::Posture(wanted) => {
+            Task::Posture(wanted) | Task::Held(wanted, _) => {
                 for (angle, wanted) in angles.iter_mut().zip(wanted) {
                     *angle += wanted.to_degrees();
                 }

@@ -46,6 +46,9 @@ pub enum BridgeVerb {
         /// Calibrate on the flat hand before: waits up to 30 s until it lies still for a second.
         #[arg(long)]
         calibrate_flat: bool,
+        /// Take the sensors as ideal: sewn on straight, with one heading. Virtual gloves only.
+        #[arg(long, requires = "calibrate_flat")]
+        ideal: bool,
         /// Activate the gripper if it is not: the fingers move.
         #[arg(long)]
         activate: bool,
@@ -53,7 +56,8 @@ pub enum BridgeVerb {
         #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
     },
-    /// Take the hand, flat and still for a second, as all joints at zero: a glove that is not calibrated does not drive.
+    /// Take the flat and still hand: it gives the headings of a glove whose profile the bridge keeps. One that is not calibrated
+    /// does not drive.
     Calibrate {
         /// Where it is.
         #[command(flatten)]
@@ -61,6 +65,12 @@ pub enum BridgeVerb {
         /// Take the newest calibration back instead.
         #[arg(long)]
         undo: bool,
+        /// Give the bridge this profile of the glove before; it keeps it over restarts.
+        #[arg(long, value_name = "FILE.toml", conflicts_with = "undo")]
+        profile: Option<PathBuf>,
+        /// Take the sensors as ideal: sewn on straight, with one heading. Virtual gloves only.
+        #[arg(long, conflicts_with_all = ["undo", "profile"])]
+        ideal: bool,
     },
     /// Open the clutch: end the hold that a vanished host has left; the gripper stays where it is.
     Release {

@@ -1,35 +1,56 @@
-//! `gauntlet bridge calibrate`: the flat hand is taken, or the newest one taken back.
+//! `gauntlet bridge calibrate`: the profile goes into the chip, the flat hand is taken, or the newest one taken back.
+
+use std::path::Path;
 
 use anyhow::Result;
 use bridge::calibration::{Refusal, Try};
 use bridge::protocol::message::Health;
 
 use super::args::BridgeAt;
-use super::drive::start;
+use super::drive::{Flat, start};
 use crate::results::{self, devices};
 use crate::tell::Tell;
+use host::calibration::Kept;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::session::refused;
 
-pub(super) fn calibrate(at: &BridgeAt, undo: bool, interrupt: &Interrupt) -> Result<()> {
+pub(super) fn undo(at: &BridgeAt) -> Result<()> {
     let tell = Tell::new(at.json);
     let mut link = at.connect()?;
-    if undo {
-        at.told(link.undo_calibration())?;
-        let health = at.told(link.health())?;
-        if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
-            return Err(refused(why, &at.devices()).into());
-        }
-        tell.say(format_args!("the newest calibration was taken back"));
-        if at.json {
-            return results::print("bridge calibrate", devices::Calibrated { health: &health });
-        }
-        return Ok(());
+    at.told(link.undo_calibration())?;
+    let health = at.told(link.health())?;
+    if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
+        return Err(refused(why, &at.devices()).into());
     }
+    tell.say(format_args!("the newest calibration was taken back"));
+    if at.json {
+        return results::print("bridge calibrate", devices::Calibrated { health: &health });
+    }
+    Ok(())
+}
+
+pub(super) fn calibrate(
+    at: &BridgeAt,
+    profile: Option<&Path>,
+    flat: Flat,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let tell = Tell::new(at.json);
+    let profile = profile.map(|path| Kept::read(path).map(|kept| (path, kept)));
+    let profile = profile.transpose()?;
+    let mut link = at.connect()?;
     // An older bridge is refused by name.
     let health = at.told(link.health())?;
+    if let Some((path, kept)) = &profile {
+        at.told(link.set_profile(Some(&kept.bound)))?;
+        tell.say(format_args!(
+            "profile    {}  is kept by the bridge",
+            path.display()
+        ));
+    }
     let mut run = start(link, None, at.devices(), interrupt)?;
+    run.is_straight(flat.ideal);
     let taken = run.calibrate(&tell).and_then(|taken| match taken {
         true => Ok(()),
         false => Err(Failure::interrupted("before the hand was taken").into()),

@@ -15,9 +15,16 @@ use host::clock::Clock;
 use host::interrupt::Interrupt;
 use host::session::{Devices, OnChip};
 
+/// A flat pose.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Flat {
+    /// Of sensors that sit straight and share a heading.
+    pub ideal: bool,
+}
+
 pub(super) fn engage(
     at: &BridgeAt,
-    calibrate: bool,
+    flat: Option<Flat>,
     activate: bool,
     seconds: Option<Duration>,
     interrupt: &Interrupt,
@@ -27,7 +34,7 @@ pub(super) fn engage(
     // An older bridge is refused before anything moves.
     at.told(link.health())?;
     let mut run = start(link, None, at.devices(), interrupt)?;
-    let ready = ready(&mut run, calibrate, activate, &tell);
+    let ready = ready(&mut run, flat, activate, &tell);
     let began = matches!(ready, Ok(true));
     let driven = ready.and_then(|ready| match ready {
         true => drive(&mut run, "gauntlet bridge engage", seconds, true, at.json),
@@ -44,8 +51,9 @@ pub(super) fn engage(
 }
 
 /// What comes before the clutch may close. Returns whether to go on.
-fn ready(run: &mut Run, calibrate: bool, activate: bool, tell: &Tell) -> Result<bool> {
-    Ok((!calibrate || run.calibrate(tell)?) && (!activate || run.activate(tell)?))
+fn ready(run: &mut Run, flat: Option<Flat>, activate: bool, tell: &Tell) -> Result<bool> {
+    run.is_straight(flat.is_some_and(|flat| flat.ideal));
+    Ok((flat.is_none() || run.calibrate(tell)?) && (!activate || run.activate(tell)?))
 }
 
 /// A run of the bridge behind `link`.

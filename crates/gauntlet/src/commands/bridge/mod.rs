@@ -34,10 +34,20 @@ pub(crate) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
         BridgeVerb::Engage {
             at,
             calibrate_flat,
+            ideal,
             activate,
             seconds,
-        } => drive::engage(at, *calibrate_flat, *activate, *seconds, interrupt),
-        BridgeVerb::Calibrate { at, undo } => calibrate::calibrate(at, *undo, interrupt),
+        } => {
+            let flat = calibrate_flat.then_some(drive::Flat { ideal: *ideal });
+            drive::engage(at, flat, *activate, *seconds, interrupt)
+        }
+        BridgeVerb::Calibrate { at, undo: true, .. } => calibrate::undo(at),
+        BridgeVerb::Calibrate {
+            at, profile, ideal, ..
+        } => {
+            let flat = drive::Flat { ideal: *ideal };
+            calibrate::calibrate(at, profile.as_deref(), flat, interrupt)
+        }
         BridgeVerb::Release { at } => release(at),
         BridgeVerb::Monitor { at, seconds } => watch::monitor(at, *seconds, interrupt),
         BridgeVerb::Log { at, out, seconds } => watch::log(at, out, *seconds, interrupt),

@@ -2,7 +2,7 @@
 
 mod flat;
 mod list;
-mod session;
+pub(in crate::commands) mod session;
 
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -18,14 +18,16 @@ use crate::commands::teleop::Hand as WhichHand;
 use crate::outputs::{self, Kind};
 use crate::results::{self, calibrations, gloves};
 use crate::tell::Tell;
+use crate::wearer::Listener;
 use host::calibration::guide::Finding;
+use host::calibration::virtual_person::VirtualPerson;
 use host::calibration::{Judged, ProfileStore};
 use host::clock::{self, Clock};
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::next::{Command, NextStep, advice};
 use host::scanning::Snapshot;
-use session::{Led, Session};
+use session::{Leading, Led, Session};
 
 /// Options of `calibrate`.
 #[derive(Debug, Args)]
@@ -41,7 +43,7 @@ moves the thumb, moves freely and lies flat once more: each is asked for in word
 Keys: space begins, r does a step again, q ends. Without a terminal it begins by itself. \
 The profile goes into a file bound to the sensors' unique ids, where `teleop` finds it. \
 It is written when every check holds or leaves doubts; what is bad is not, but with --keep-anyway. \
-A virtual glove's person does what is asked by itself (`gauntlet simulate --honest 1`). Exit code 1 where nothing is kept.")]
+A virtual glove's person does what is asked by itself (`gauntlet simulate`). Exit code 1 where nothing is kept.")]
 pub struct Calibrate {
     /// The glove's serial port; needed but for --list.
     #[arg(long, value_name = "PORT")]
@@ -153,7 +155,14 @@ fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()
         return Err(Failure::new(what, at.doctor()).into());
     }
     let ids = ids(scanning.snapshot().as_ref(), &at)?;
-    let mut session = Session::new(scanning, clock, options, glove);
+    let leading = Leading {
+        declared: options.declared(),
+        keep_anyway: options.keep_anyway,
+        by_itself: false,
+        json: options.json,
+    };
+    let person = VirtualPerson::at(glove).map(Listener::There);
+    let mut session = Session::new(scanning, clock, leading, person);
     let led = session.lead(&tell, interrupt);
     let done = session.finish();
     let mut kept = None;

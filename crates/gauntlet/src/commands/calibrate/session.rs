@@ -1,19 +1,18 @@
 //! The session: scans in, words and pictures out, keys heard.
 
-use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use glove::calibration::{Unfinished, Verdict};
+use glove::hand::Side;
 
-use super::Calibrate;
 use crate::live::guided::GuideView;
 use crate::live::{Key, Live};
 use crate::out;
 use crate::results::calibrations::Repeated;
 use crate::tell::Tell;
+use crate::wearer::Listener;
 use host::calibration::guide::{News, PARTS, Remark, Stage, plan};
-use host::calibration::virtual_person::VirtualPerson;
 use host::calibration::{Guide, Judged};
 use host::clock::Clock;
 use host::failure::OrFail;
@@ -26,7 +25,7 @@ const ROUND: Duration = Duration::from_millis(20);
 const SAID_EVERY: Duration = Duration::from_secs(3);
 
 /// How it ended.
-pub(super) enum Led {
+pub(in crate::commands) enum Led {
     /// With a verdict; `agreed`: the person saw it and wants it kept.
     Judged { judged: Box<Judged>, agreed: bool },
     /// Without an outcome.
@@ -36,7 +35,7 @@ pub(super) enum Led {
 }
 
 /// What is left of it.
-pub(super) struct Done {
+pub(in crate::commands) struct Done {
     pub judged: Option<Judged>,
     /// Steps that were asked for again, and why.
     pub again: Vec<Repeated>,
@@ -44,13 +43,27 @@ pub(super) struct Done {
     pub seen: Option<Snapshot>,
 }
 
+/// How it is led.
+#[derive(Debug, Clone, Copy, Default)]
+pub(in crate::commands) struct Leading {
+    /// Which hand the person says it is.
+    pub declared: Option<Side>,
+    /// What is bad may be kept.
+    pub keep_anyway: bool,
+    /// It begins and ends by itself: nobody but a virtual person takes part.
+    pub by_itself: bool,
+    /// A program reads the result.
+    pub json: bool,
+}
+
 /// A session under way.
-pub(super) struct Session {
+pub(in crate::commands) struct Session {
     scanning: Scanning,
     clock: Clock,
     guide: Guide,
-    person: Option<VirtualPerson>,
+    person: Option<Listener>,
     keep_anyway: bool,
+    by_itself: bool,
     json: bool,
     again: Vec<Repeated>,
     started: Instant,
@@ -58,17 +71,23 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub fn new(scanning: Scanning, clock: Clock, options: &Calibrate, glove: &Path) -> Self {
+    pub fn new(
+        scanning: Scanning,
+        clock: Clock,
+        leading: Leading,
+        person: Option<Listener>,
+    ) -> Self {
         // What waited is of before.
         scanning.waiting().for_each(drop);
         scanning.begin();
         Self {
             scanning,
             clock,
-            guide: Guide::new(options.declared()),
-            person: VirtualPerson::at(glove),
-            keep_anyway: options.keep_anyway,
-            json: options.json,
+            guide: Guide::new(leading.declared),
+            person,
+            keep_anyway: leading.keep_anyway,
+            by_itself: leading.by_itself,
+            json: leading.json,
             again: Vec::new(),
             started: Instant::now(),
             said: None,
@@ -95,6 +114,8 @@ impl Session {
             tell.say(format_args!(
                 "session  {PARTS} steps, {lasts} s; Ctrl-C ends it"
             ));
+        }
+        if !drawn || self.by_itself {
             self.guide.go_on(self.clock.now());
         }
         loop {
@@ -115,7 +136,7 @@ impl Session {
                     Key::Calibrate => {}
                 }
             }
-            if self.is_over() && !drawn {
+            if self.is_over() && (!drawn || self.by_itself) {
                 return Ok(self.over(false));
             }
             if drawn {

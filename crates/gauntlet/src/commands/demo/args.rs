@@ -17,9 +17,12 @@ Examples:
   gauntlet demo --seconds 60 --json > result.json
   gauntlet demo --gripper-model 2f85
   gauntlet demo --on-chip
+  gauntlet demo --calibrate
 
 The poses file is CSV with a header: optional `time_s` first, then the 25 joint angles in radians \
 (thumb_cmc_flex, thumb_cmc_abd, … little_dip_flex; docs/tool.md lists them). \
+A virtual person wears the glove, whose sensors are as real ones: sewn on any way, each with a heading of its own that drifts, noise, \
+flipped bits. The person is calibrated first, on a clock that waits for nobody; --calibrate shows that session as it is, in a minute. \
 Keys while it runs on a terminal: space opens and closes the clutch, q holds the gripper and ends.")]
 pub struct Demo {
     /// Train on and play this recording of a hand instead of generated motion.
@@ -40,6 +43,15 @@ pub struct Demo {
     /// Which gripper follows the hand.
     #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
     pub gripper_model: Model,
+    /// Sensors that sit straight and share one heading, as no real ones do: nobody needs to be calibrated.
+    #[arg(long)]
+    pub ideal: bool,
+    /// Show the guided calibration of the virtual person in real time: a minute.
+    #[arg(long, conflicts_with = "ideal")]
+    pub calibrate: bool,
+    /// Take this profile of the virtual person's glove (`simulate` with the same seed writes one) instead of calibrating.
+    #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["ideal", "calibrate"])]
+    pub profile: Option<PathBuf>,
     /// Run the bridge's ARM firmware in QEMU instead of on this processor.
     #[arg(long, conflicts_with = "log")]
     pub on_chip: bool,
@@ -61,6 +73,9 @@ impl Default for Demo {
             seed: 1,
             no_start_pairs: false,
             gripper_model: Model::ThreeFinger,
+            ideal: false,
+            calibrate: false,
+            profile: None,
             on_chip: false,
             firmware: None,
             json: false,

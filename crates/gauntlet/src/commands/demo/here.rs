@@ -4,9 +4,9 @@ use std::time::Duration;
 
 use anyhow::Result;
 use glove::hand::Side;
-use rig::pty::Handle;
 
-use super::parts::{self, Stage, Started};
+use super::parts::{self, Stage, Started, Virtual};
+use super::person;
 use crate::progress::Person;
 use crate::run::{LogTo, Run};
 use crate::tell::Tell;
@@ -18,35 +18,39 @@ use host::probe;
 use host::session::record::Feed;
 use host::session::{Devices, InProcess, Parts};
 use host::training::model;
-use host::training::motion::Motion;
 
-/// Trains, starts the devices, and the bridge between them.
+/// Starts the devices, calibrates, trains, and starts the bridge between them.
 ///
 /// # Errors
 /// A failure that says which of its steps did not succeed.
 pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     let Stage {
         options,
-        motion,
         tell,
         interrupt,
+        ..
     } = stage;
     let clock = Clock::start();
     stage.introduce("everything between them is real");
+    let devices = Virtual::start(stage)?;
+    let profile = person::profile(stage, &devices)?;
     let outcome = parts::trained(stage)?;
     let image = model::image(&outcome.model)?;
     let length = image.len();
     let model = options.gripper_model;
     let log = options.log.clone();
     let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
-    let (devices, parts) = devices(motion, model, image, feed, tell, interrupt)?;
+    let parts = opened(&devices, model, image, feed, tell, interrupt)?;
     let session = InProcess::start(parts, clock, interrupt)?;
     tell.say(format_args!(
         "weights    an image of {length} bytes is stored and checked in the bridge's weights store"
     ));
+    let run = Run::new(session, log, clock, interrupt.clone(), Devices::Unknown);
+    let (run, person) = parts::worn(run, profile, &devices);
     Ok(Started {
-        run: Run::new(session, log, clock, interrupt.clone(), Devices::Unknown),
+        run,
         outcome,
+        person,
         flashed: None,
         home: Box::new(devices),
         framed: |seen| seen.frame_sequence > 0,
@@ -54,25 +58,25 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     })
 }
 
-/// Starts both devices and opens the ports to them.
-fn devices(
-    motion: &Motion,
+/// Opens the ports to both devices.
+fn opened(
+    devices: &Virtual,
     model: Model,
     image: Vec<u8>,
     feed: Option<Feed>,
     tell: &Tell,
     interrupt: &Interrupt,
-) -> Result<([Handle; 2], Parts)> {
-    let [glove, gripper] = parts::virtual_devices(motion, model)?;
+) -> Result<Parts> {
+    let (glove, gripper) = (devices.glove_port.path(), devices.gripper_port.path());
     tell.say(format_args!(
         "devices    virtual glove on {}, virtual gripper on {}, {BAUD} baud",
-        glove.path().display(),
-        gripper.path().display()
+        glove.display(),
+        gripper.display()
     ));
-    let (gripper_port, _) = probe::open_gripper(gripper.path(), model, &Person, interrupt)?;
-    let parts = Parts {
-        glove: probe::open_glove(glove.path(), interrupt)?.port.into(),
-        gripper: gripper_port,
+    let (gripper, _) = probe::open_gripper(gripper, model, &Person, interrupt)?;
+    Ok(Parts {
+        glove: probe::open_glove(glove, interrupt)?.port.into(),
+        gripper,
         model,
         line: host::lines::Settings::default(),
         image,
@@ -80,6 +84,5 @@ fn devices(
         profile: None,
         driving: host::session::Driving::default(),
         feed,
-    };
-    Ok(([glove, gripper], parts))
+    })
 }

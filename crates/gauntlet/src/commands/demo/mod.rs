@@ -4,6 +4,7 @@ mod args;
 mod here;
 mod on_chip;
 mod parts;
+mod person;
 
 use anyhow::Result;
 
@@ -49,6 +50,7 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let Started {
         run,
         outcome,
+        person,
         flashed,
         home,
         ..
@@ -71,6 +73,7 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             epochs: outcome.epochs,
             pairs: outcome.pairs,
             quality: &outcome.quality,
+            person: person.as_ref(),
             flash: flashed.as_ref(),
             run: finished.result(failure),
         };

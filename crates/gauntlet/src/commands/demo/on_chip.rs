@@ -3,16 +3,17 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use rig::pty::Handle;
 
 use super::args::Demo;
-use super::parts::{self, Stage, Started};
+use super::parts::{self, Stage, Started, Virtual};
+use super::person;
 use crate::commands::{bridge, flash};
 use crate::tell::Tell;
 use host::chip::emulator::{Emulator, Setup, find_firmware};
 use host::failure::Failure;
 use host::lines::Model;
 use host::next::Command;
+use host::probe;
 use host::session::Devices;
 use host::training::model;
 
@@ -42,18 +43,21 @@ pub(super) fn check(options: &Demo) -> Result<()> {
 pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     let Stage {
         options,
-        motion,
         tell,
         interrupt,
+        ..
     } = stage;
     // What is missing is said before the training, not after it.
     let firmware = find_firmware(options.firmware.as_deref())?;
     stage.introduce("the bridge is its ARM firmware in QEMU");
-    let devices = parts::virtual_devices(motion, options.gripper_model)?;
+    let devices = Virtual::start(stage)?;
+    let profile = person::profile(stage, &devices)?;
+    // The emulated line has one speed.
+    drop(probe::open_glove(devices.glove_port.path(), interrupt)?);
     let mut emulator = Emulator::new(Setup {
         firmware,
-        glove: Some(devices[0].path().to_owned()),
-        gripper: Some(devices[1].path().to_owned()),
+        glove: Some(devices.glove_port.path().to_owned()),
+        gripper: Some(devices.gripper_port.path().to_owned()),
         debugger: false,
     })?;
     let outcome = parts::trained(stage)?;
@@ -61,10 +65,16 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     let mut link = emulator.link_unless(interrupt)?;
     tell_parts(&devices, &emulator, tell);
     let flashed = flash::flash(&mut link, &image, tell, interrupt)?;
+    // The emulated chip is gone when somebody could look at it.
+    let run = bridge::start(link, None, Devices::Unknown, interrupt)?;
+    let (run, person) = parts::worn(run, profile, &devices);
+    if person.is_some() {
+        tell.say(format_args!("profile    goes into the chip's store"));
+    }
     Ok(Started {
-        // The emulated chip is gone when somebody could look at it.
-        run: bridge::start(link, None, Devices::Unknown, interrupt)?,
+        run,
         outcome,
+        person,
         flashed: Some(flashed),
         home: Box::new((emulator, devices)),
         framed: |seen| seen.glove_answers,
@@ -72,11 +82,11 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     })
 }
 
-fn tell_parts(devices: &[Handle; 2], emulator: &Emulator, tell: &Tell) {
+fn tell_parts(devices: &Virtual, emulator: &Emulator, tell: &Tell) {
     tell.say(format_args!(
         "devices    virtual glove on {}, virtual gripper on {}",
-        devices[0].path().display(),
-        devices[1].path().display()
+        devices.glove_port.path().display(),
+        devices.gripper_port.path().display()
     ));
     tell.say(format_args!(
         "bridge     Cortex-M4F (mps2-an386), host protocol on {}",

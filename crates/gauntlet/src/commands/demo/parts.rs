@@ -4,6 +4,7 @@ use std::any::Any;
 use std::time::Duration;
 
 use anyhow::Result;
+use glove::calibration::Bound;
 use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
@@ -15,12 +16,13 @@ use super::args::Demo;
 use crate::commands::simulate;
 use crate::played;
 use crate::progress::Person;
+use crate::results::runs;
 use crate::run::Run;
 use crate::tell::Tell;
+use crate::wearer::{Listener, Wearer};
 use host::chip::link::Flashed;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
-use host::lines::Model;
 use host::lines::port::BAUD;
 use host::next::{Command, NextStep, advice};
 use host::realtime;
@@ -58,6 +60,8 @@ pub(super) struct Started {
     pub(super) run: Run,
     /// The training before it.
     pub(super) outcome: Outcome,
+    /// Who wears the glove; `None` with ideal sensors.
+    pub(super) person: Option<runs::Person>,
     /// How the map came into a chip.
     pub(super) flashed: Option<Flashed>,
     /// Devices and emulator: gone when this is dropped.
@@ -117,16 +121,48 @@ fn require_good(quality: &Quality) -> Result<()> {
     Err(Failure::new(fault, next).into())
 }
 
-/// A glove that moves as `motion` does, and a gripper that is not activated, each behind a pseudo-terminal.
-pub(super) fn virtual_devices(motion: &Motion, model: Model) -> Result<[Handle; 2]> {
-    let glove = VirtualGlove::new(
-        played::virtual_hand(motion),
-        rig::glove::Config::at_baud(BAUD),
-    );
-    let glove = spawn("glove", Box::new(glove))?;
-    let gripper = VirtualGripper::new(rig::gripper::Config::of(simulate::family(model)));
-    let gripper = spawn("gripper", Box::new(gripper))?;
-    Ok([glove, gripper])
+/// The virtual devices, each behind a pseudo-terminal.
+pub(super) struct Virtual {
+    /// The glove.
+    pub(super) glove: VirtualGlove,
+    /// The way to it.
+    pub(super) glove_port: Handle,
+    /// The way to the gripper, which is not activated.
+    pub(super) gripper_port: Handle,
+}
+
+impl Virtual {
+    /// A glove on a hand that moves as the motion does, and a gripper.
+    pub(super) fn start(stage: Stage<'_>) -> Result<Self> {
+        let options = stage.options;
+        let glove = match options.ideal {
+            true => VirtualGlove::new(
+                played::virtual_hand(stage.motion),
+                rig::glove::Config::at_baud(BAUD),
+            ),
+            false => Wearer::new(options.seed).playing(played::source(stage.motion)),
+        };
+        let gripper = rig::gripper::Config::of(simulate::family(options.gripper_model));
+        Ok(Self {
+            glove_port: spawn("glove", Box::new(glove.clone()))?,
+            gripper_port: spawn("gripper", Box::new(VirtualGripper::new(gripper)))?,
+            glove,
+        })
+    }
+}
+
+/// Gives the bridge the glove's profile; the person in it lies flat when that is asked for.
+pub(super) fn worn(
+    mut run: Run,
+    profile: Option<(Bound, runs::Person)>,
+    devices: &Virtual,
+) -> (Run, Option<runs::Person>) {
+    let Some((bound, person)) = profile else {
+        return (run, None);
+    };
+    run.wears(Some(bound));
+    run.has(Some(Listener::Here(devices.glove.clone())));
+    (run, Some(person))
 }
 
 fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {

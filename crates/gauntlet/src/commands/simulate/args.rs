@@ -4,8 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
+use glove::hand::Side;
 
 use crate::options::model_parser;
+use crate::wearer::Wearer;
 use host::failure::Failure;
 use host::lines::Model;
 
@@ -21,17 +23,22 @@ Examples:
   gauntlet simulate --glove /tmp/glove --poses my_hand.csv
   gauntlet simulate --gripper tcp:127.0.0.1:1502                     the 3-Finger's Modbus TCP variant
   gauntlet simulate --gripper /tmp/gripper --gripper-model 2f85
-  gauntlet simulate --honest 7                                       sensors as they really are; in another terminal:
+  gauntlet simulate --seed 7 --left --swap 8,11                      another person, a left hand, two sensors exchanged
+
+and, once `ready` is there, in another terminal:
+  gauntlet glove watch --glove /tmp/glove
   gauntlet calibrate --glove /tmp/glove
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat   (in another terminal)
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat
 
 Each device sits behind a pseudo-terminal; the path becomes a link to it. They speak the bytes of the real \
 ones at 115200 baud, and noise at any other speed. A gripper at tcp:HOST:PORT listens there instead; port 0 \
 takes any free one and tells which. `ready` on a line of its own says that they answer, the glove's sensors, too. \
-The virtual hand lies flat for 3 s when the glove's port is opened, to be calibrated, then it moves; \
+The glove's sensors are as real ones: powered on at 9600 baud (and set to 115200 before `ready`), sewn on any way, each with a \
+heading of its own that drifts, noise, flipped bits. Its virtual person is calibrated on a clock of its own before that, and the \
+profile written where `teleop` finds it by the sensors' ids. The person does by itself what other verbs ask for at this path. \
+The hand lies flat for 3 s when the glove's port is opened, then it moves; \
 Enter lays it flat at any time, and Enter again lets it move. \
-With --honest its sensors are as real ones: sewn on any way, each with a heading of its own that drifts, noise, flipped bits. \
-Its person does by itself what `gauntlet calibrate --glove PATH` asks for. \
+With --ideal the sensors sit straight and share a heading, as no real ones do: `teleop` takes them with --ideal, too. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -46,17 +53,17 @@ pub struct Simulate {
     /// The glove plays this recording of a hand instead of generated motion.
     #[arg(long, value_name = "FILE.csv")]
     pub poses: Option<PathBuf>,
-    /// Seed of the generated motion.
+    /// Seed of the generated motion, the virtual person and the glove.
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
-    /// A virtual person with sensors as they really are, from this seed, instead of a hand whose sensors sit straight.
-    #[arg(long, value_name = "SEED", conflicts_with = "poses")]
-    pub honest: Option<u64>,
-    /// The virtual person's glove is a left one.
-    #[arg(long, requires = "honest")]
+    /// Sensors that sit straight and share one heading, as no real ones do.
+    #[arg(long)]
+    pub ideal: bool,
+    /// The glove is a left one.
+    #[arg(long, conflicts_with = "ideal")]
     pub left: bool,
-    /// Two sensors of it, as they are wired, are swapped: 8,11.
-    #[arg(long, value_name = "A,B", requires = "honest", value_parser = swapped)]
+    /// Two of its sensors, as they are wired, sit on each other's segment: 8,11.
+    #[arg(long, value_name = "A,B", conflicts_with = "ideal", value_parser = swapped)]
     pub swap: Option<(usize, usize)>,
 }
 
@@ -70,6 +77,19 @@ fn swapped(text: &str) -> Result<(usize, usize), String> {
 }
 
 impl Simulate {
+    /// The virtual person; `None` for ideal sensors.
+    pub(super) fn wearer(&self) -> Option<Wearer> {
+        let side = match self.left {
+            true => Side::Left,
+            false => Side::Right,
+        };
+        (!self.ideal).then(|| Wearer {
+            side,
+            swapped: self.swap,
+            ..Wearer::new(self.seed)
+        })
+    }
+
     /// Where to make the glove and the gripper: what was said, or both at their default places.
     pub(super) fn places(&self) -> Result<[Option<&Path>; 2]> {
         let unused = |option: &str, device: &str| {
@@ -97,7 +117,7 @@ mod tests {
             gripper_model: None,
             poses: None,
             seed: 1,
-            honest: None,
+            ideal: false,
             left: false,
             swap: None,
         }

@@ -6,15 +6,14 @@ use std::time::Duration;
 
 use anyhow::Result;
 use rig::Device;
-use rig::glove::{Honest, VirtualGlove};
+use rig::glove::VirtualGlove;
 use rig::gripper::tcp::TcpHandle;
 use rig::gripper::{Family, VirtualGripper};
-use rig::person::Traits;
 use rig::pty::{Handle, PtyDevice};
 
-use super::Simulate;
 use crate::heard::Ear;
 use crate::played;
+use crate::wearer::Wearer;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
@@ -37,16 +36,16 @@ pub(super) struct Glove {
 
 impl Glove {
     /// Makes one that `link` leads to.
-    pub fn start(motion: &Motion, options: &Simulate, link: &Path) -> Result<Self> {
-        let device = match options.honest {
-            Some(seed) => honest(seed, options),
+    pub fn start(motion: &Motion, wearer: Option<&Wearer>, link: &Path) -> Result<Self> {
+        let device = match wearer {
+            Some(wearer) => wearer.playing(played::source(motion)),
             None => {
                 let config = rig::glove::Config::at_baud(BAUD);
                 VirtualGlove::new(played::virtual_hand(motion), config)
             }
         };
         let handle = spawn(Box::new(device.clone()), link)?;
-        let ear = options.honest.map(|_| Ear::of(&device, link)).transpose()?;
+        let ear = wearer.map(|_| Ear::of(&device, link)).transpose()?;
         Ok(Self {
             device,
             handle,
@@ -55,14 +54,9 @@ impl Glove {
     }
 
     /// Where a program finds it, and what its hand does.
-    pub fn describe(&self, motion: &Motion, honest: Option<u64>) -> String {
+    pub fn describe(&self, sensors: &str, motion: &Motion) -> String {
         let place = self.handle.path().display();
-        match honest {
-            Some(seed) => {
-                format!("{place}  {BAUD} baud, honest sensors and a virtual person (seed {seed})")
-            }
-            None => format!("{place}  {BAUD} baud, {}", motion.describe()),
-        }
+        format!("{place}  {BAUD} baud, {sensors}, {}", motion.describe())
     }
 
     /// Waits until its sensors have booted, and asks its serial multiplexer.
@@ -70,32 +64,6 @@ impl Glove {
         while !self.device.booted(self.handle.clock().now()) && !interrupt.sleep(LOOK) {}
         probe::open_glove(self.handle.path(), interrupt).map(drop)
     }
-}
-
-/// A glove as it really is, on a virtual person.
-fn honest(seed: u64, options: &Simulate) -> VirtualGlove {
-    let mut honest = Honest {
-        seed,
-        ..Honest::default()
-    };
-    if let Some((a, b)) = options.swap {
-        honest.seats.swap(a, b);
-    }
-    let config = rig::glove::Config {
-        side: if options.left {
-            rig::glove::Side::Left
-        } else {
-            rig::glove::Side::Right
-        },
-        honest: Some(honest),
-        ..rig::glove::Config::at_baud(BAUD)
-    };
-    let person = rig::person::Person::new(Traits {
-        seed,
-        is_left: options.left,
-        ..Traits::default()
-    });
-    VirtualGlove::new(Box::new(person), config)
 }
 
 /// A virtual gripper and the way to it.

@@ -15,7 +15,9 @@ pub(super) use devices::family;
 use crate::flat_hand::Hand;
 use crate::progress::Person;
 use crate::say;
+use crate::wearer::Wearer;
 use devices::{Glove, Gripper};
+use host::calibration::ProfileStore;
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::probe;
@@ -32,11 +34,19 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     let [glove_place, gripper_place] = options.places()?;
     let model = options.gripper_model.unwrap_or(Model::ThreeFinger);
     let motion = Motion::open(options.poses.as_deref(), options.seed, &Person)?;
+    let wearer = options.wearer();
     let glove = glove_place
-        .map(|path| Glove::start(&motion, options, path))
+        .map(|path| Glove::start(&motion, wearer.as_ref(), path))
         .transpose()?;
     if let Some(glove) = &glove {
-        say!("glove    {}", glove.describe(&motion, options.honest));
+        let sensors = match wearer {
+            Some(_) => format!("a virtual person (seed {})", options.seed),
+            None => "ideal sensors".to_owned(),
+        };
+        say!("glove    {}", glove.describe(&sensors, &motion));
+    }
+    if let (Some(wearer), Some(_)) = (&wearer, &glove) {
+        keep_profile(wearer, interrupt)?;
     }
     let gripper = gripper_place
         .map(|place| Gripper::start(place, model))
@@ -67,5 +77,24 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     }
     // Taking the handles down removes the links.
     drop((glove, gripper));
+    Ok(())
+}
+
+/// Calibrates the virtual person, and writes the profile where other verbs find it. Where that cannot be written the devices are of use
+/// all the same.
+fn keep_profile(wearer: &Wearer, interrupt: &Interrupt) -> Result<()> {
+    let done = wearer.calibrated(interrupt)?;
+    let saved = ProfileStore::usual().and_then(|store| store.save(&done.kept));
+    match saved {
+        Ok(path) => say!(
+            "profile  {}  of its person: {}",
+            path.display(),
+            done.line()
+        ),
+        Err(failure) => {
+            say!("warning: the virtual person's profile is not kept: {failure}");
+            say!("  try: {}", failure.next_step());
+        }
+    }
     Ok(())
 }

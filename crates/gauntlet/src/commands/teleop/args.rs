@@ -22,7 +22,7 @@ pub enum Hand {
 #[command(after_help = "\
 Examples:
   gauntlet teleop --glove /dev/ttyUSB0 --gripper /dev/ttyUSB1 --model model.safetensors
-  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --ideal --calibrate-flat --engage --activate --seconds 10
+  gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
 
 The glove's profile (`gauntlet calibrate`) is found by its sensors' ids; after each power-on of the glove one flat pose \
 gives the headings: `--calibrate-flat`, or the key c. Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \

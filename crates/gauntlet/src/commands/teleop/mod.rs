@@ -13,6 +13,8 @@ use crate::progress::Person;
 use crate::results;
 use crate::run::{LogTo, Options, Run};
 use crate::tell::Tell;
+use crate::wearer::Listener;
+use host::calibration::virtual_person::VirtualPerson;
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -95,6 +97,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         settings: line,
     };
     let mut run = Run::new(session, log, clock, interrupt.clone(), devices);
+    run.has(VirtualPerson::at(&options.glove).map(Listener::There));
     let prepared = prepare(options, &mut run, &tell, activation);
     let frames = !matches!(prepared, Ok(Prepared::NoFrames));
     let driven = match prepared {

@@ -107,7 +107,9 @@ impl Rest {
     /// How far each segment's sensor is turned against the hand's from where it lay, by segment, radians. `None` before the headings are
     /// known, or while the hand's sensor is away; 0 for a sensor that is away.
     fn angles(&self, scan: &Aligned, session: &Session) -> Option<[f32; SEGMENT_COUNT]> {
-        let seat = |segment: usize| match session.identity() {
+        // Asked for once: it costs as much as all the rest.
+        let identity = session.identity();
+        let seat = |segment: usize| match identity {
             Identity::Moved(seats) => usize::from(seats[segment]),
             _ => segment,
         };
