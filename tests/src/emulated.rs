@@ -3,21 +3,23 @@
 use std::io::Write;
 use std::os::unix::net::UnixStream;
 use std::path::Path;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
 use bridge::State;
 use bridge::calibration::Try;
 use bridge::protocol::message::{Answer, Call, Counters, Restart, SlotContents};
+use gauntlet::wearer::Wearer;
 use gripper::Activation;
 use host::chip::emulator::{Emulator, Setup};
 use host::chip::link::{Address, Error, Heartbeat, HostLink};
 use host::interrupt::Interrupt;
+use host::probe;
 use host::realtime;
 use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
+use rig::person::{Attitude, Task};
 use rig::pty::{Handle, PtyDevice};
 
 use crate::debugger;
@@ -131,16 +133,25 @@ pub fn hold_clutch(link: &mut HostLink, time: Duration) -> Vec<State> {
     states
 }
 
-/// Calibrates the bridge on the hand as it lies now, as often as it takes: sensors may just be coming up.
-fn calibrate(link: &mut HostLink) {
-    link.calibrate_straight().expect("taken");
-    wait_for(link, "the calibration", |link| {
+/// Lays the hand flat and takes the pose, as often as it takes: sensors may just be coming up. Then the hand moves.
+fn take_flat(link: &mut HostLink, glove: &VirtualGlove) {
+    glove.ask(Task::Flat);
+    link.calibrate_flat_hand().expect("taken");
+    wait_for(link, "the flat pose", |link| {
         let calibration = link.health().expect("an answer").calibration;
         if matches!(calibration.newest, Try::Refused(_)) {
-            link.calibrate_straight().expect("taken");
+            link.calibrate_flat_hand().expect("taken");
         }
         calibration.is_calibrated
     });
+    glove.ask(Task::Use(Attitude::PalmDown));
+}
+
+/// The index finger opens and closes.
+fn index_bends(time_s: f64) -> [f32; 25] {
+    let mut pose = [0.0; 25];
+    pose[5] = 0.6 * (1.0 - (1.5 * time_s).cos()) as f32;
+    pose
 }
 
 /// The firmware between the virtual devices, its gripper active, its weights in place.
@@ -151,8 +162,8 @@ pub struct Loop {
     pub gripper: VirtualGripper,
     emulator: Emulator,
     ports: [Handle; 2],
-    /// Whether the hand moves, or lies flat.
-    moves: Arc<AtomicBool>,
+    /// On a virtual person, of sensors as they really are.
+    glove: VirtualGlove,
 }
 
 /// What a stretch of time did to the counters.
@@ -171,24 +182,22 @@ pub struct Stretch {
 }
 
 impl Loop {
-    /// Starts everything; a hand opens and closes its index finger.
+    /// Starts everything; a virtual person, calibrated on another day, opens and closes the index finger.
     ///
     /// # Panics
     /// Anything does not come up within a minute.
     pub fn start(firmware: &Path) -> Self {
-        // It lies flat while the sensors come up and the glove is calibrated.
-        let moves = Arc::new(AtomicBool::new(false));
-        let moving = Arc::clone(&moves);
-        let hand = move |time_s: f64| {
-            let mut pose = [0.0; 25];
-            if moving.load(Ordering::Relaxed) {
-                pose[5] = 0.6 * (1.0 - (1.5 * time_s).cos()) as f32;
-            }
-            pose
-        };
-        let glove = VirtualGlove::new(Box::new(hand), rig::glove::Config::at_baud(115_200));
+        let never = Interrupt::never().expect("an interrupt");
+        let wearer = Wearer::new(1);
+        let calibrated = wearer.calibrated(&never).expect("calibrated");
+        let glove = wearer.playing(Box::new(index_bends));
         let gripper = VirtualGripper::new(rig::gripper::Config::default());
-        let ports = [spawn(Box::new(glove)), spawn(Box::new(gripper.clone()))];
+        let ports = [
+            spawn(Box::new(glove.clone())),
+            spawn(Box::new(gripper.clone())),
+        ];
+        // Fresh from power-on it speaks 9,600 baud, and the emulated line 115,200.
+        drop(probe::open_glove(ports[0].path(), &never).expect("a glove"));
         let mut emulator = Emulator::new(Setup {
             firmware: firmware.to_owned(),
             glove: Some(ports[0].path().to_owned()),
@@ -207,19 +216,19 @@ impl Loop {
             link.status().expect("an answer").gripper.is_some()
         });
         assert_eq!(link.status().expect("an answer").state, State::Idle);
-        calibrate(&mut link);
+        link.set_profile(Some(calibrated.bound())).expect("kept");
+        take_flat(&mut link, &glove);
         link.activate().expect("taken");
         wait_for(&mut link, "the activation", |link| {
             let gripper = link.status().expect("an answer").gripper;
             gripper.is_some_and(|gripper| gripper.activation == Activation::Ready)
         });
-        moves.store(true, Ordering::Relaxed);
         Self {
             link,
             gripper,
             emulator,
             ports,
-            moves,
+            glove,
         }
     }
 
@@ -240,9 +249,8 @@ impl Loop {
         if health.calibration.is_calibrated {
             return false;
         }
-        self.moves.store(false, Ordering::Relaxed);
-        calibrate(&mut self.link);
-        self.moves.store(true, Ordering::Relaxed);
+        // The profile outlived it.
+        take_flat(&mut self.link, &self.glove);
         true
     }
 

@@ -12,7 +12,7 @@ use glove::scan::{Config, Scanner};
 use glove::timing;
 use host::clock::Clock;
 use host::lines::port::{BAUD, Port};
-use support::Simulation;
+use support::{Simulation, json, kept_waiting, model, run};
 
 /// Channel 0 of the multiplexer, then the chip id of the sensor at 0x28.
 const CHIP_ID: [u8; 13] = [
@@ -75,4 +75,34 @@ fn the_hand_lies_flat_at_every_opening_of_the_port_and_moves_after_that() {
         let furthest = calibrate_and_watch(&simulation.glove());
         assert!(furthest > 0.3, "opening {opening}: {furthest} rad");
     }
+}
+
+#[test]
+fn an_honest_glove_drives_by_the_profile_that_simulate_wrote() {
+    let simulation = Simulation::with(true, Some("gripper"), &["--seed", "5"]);
+    let (glove, gripper) = (simulation.glove(), simulation.gripper());
+    let teleop = [
+        "teleop",
+        "--glove",
+        &glove,
+        "--gripper",
+        &gripper,
+        "--model",
+        model().to_str().unwrap(),
+        "--calibrate-flat",
+        "--engage",
+        "--activate",
+        "--seconds",
+        "6",
+        "--json",
+    ];
+    let output = run(&teleop);
+    if kept_waiting(&output) {
+        return rig::skip::skipped(
+            rig::skip::Need::Machine,
+            "this machine had no time for a run",
+        );
+    }
+    let said = json(&output);
+    assert!(said["run"]["first_motion_s"].as_f64().is_some(), "{said}");
 }
