@@ -3,10 +3,11 @@
 
 use std::io::{ErrorKind, IsTerminal};
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use anyhow::Result;
 use clap::Args;
+use glove::calibration::{Bound, Profile};
 use glove::hand::Side;
 use rig::Device;
 use rig::glove::VirtualGlove;
@@ -20,8 +21,10 @@ use crate::options::model_parser;
 use crate::played;
 use crate::progress::Person;
 use crate::say;
-use crate::wearer::Wearer;
-use host::calibration::ProfileStore;
+use crate::wearer::{Wearer, ids};
+use host::calibration::profile_file::Quality;
+use host::calibration::{Kept, ProfileStore};
+use host::clock::rfc3339;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Model;
@@ -35,6 +38,13 @@ use host::training::motion::Motion;
 const WATCH: Duration = Duration::from_millis(50);
 /// How often the sensors are looked at while they boot (650 ms).
 const LOOK: Duration = Duration::from_millis(20);
+/// The hand's x is level and its y up, w x y z.
+const PALM_DOWN: [f32; 4] = [
+    std::f32::consts::FRAC_1_SQRT_2,
+    std::f32::consts::FRAC_1_SQRT_2,
+    0.0,
+    0.0,
+];
 /// Where the devices are linked when no path is given.
 const GLOVE: &str = "/tmp/glove";
 const GRIPPER: &str = "/tmp/gripper";
@@ -62,7 +72,7 @@ heading of its own that drifts, noise, flipped bits. Its virtual person is calib
 profile written where `teleop` finds it by the sensors' ids. The person does by itself what other verbs ask for at this path. \
 The hand lies flat for 3 s when the glove's port is opened, then it moves; \
 Enter lays it flat at any time, and Enter again lets it move. \
-With --ideal the sensors sit straight and share a heading, as no real ones do: `teleop` takes them with --ideal, too. \
+With --ideal the sensors sit straight and share a heading, as no real ones do; their profile says so. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.
@@ -131,8 +141,8 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
             motion.describe()
         );
     }
-    if let (Some(wearer), Some(_)) = (&wearer, &glove) {
-        keep_profile(wearer, interrupt)?;
+    if let Some(glove) = &glove {
+        keep_profile(wearer.as_ref(), &glove.device, interrupt)?;
     }
     let gripper = gripper_place
         .map(|place| Simulated::start(place, model))
@@ -157,8 +167,8 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
         if let Some(hand) = &mut hand {
             hand.listen();
         }
-        if let Some(ear) = glove.as_ref().and_then(|glove| glove.ear.as_ref()) {
-            ear.listen();
+        if let Some(glove) = &glove {
+            glove.ear.listen();
         }
     }
     // Taking the handles down removes the links.
@@ -185,8 +195,8 @@ fn places(options: &Simulate) -> Result<[Option<&Path>; 2]> {
 struct Glove {
     device: VirtualGlove,
     handle: Handle,
-    /// Of the virtual person.
-    ear: Option<Ear>,
+    /// Of the virtual person, or of a hand that can lie flat.
+    ear: Ear,
 }
 
 impl Glove {
@@ -195,12 +205,15 @@ impl Glove {
         let device = match wearer {
             Some(wearer) => wearer.playing(played::source(motion)),
             None => {
-                let config = rig::glove::Config::at_baud(BAUD);
+                let config = rig::glove::Config {
+                    world: PALM_DOWN,
+                    ..rig::glove::Config::at_baud(BAUD)
+                };
                 VirtualGlove::new(played::virtual_hand(motion), config)
             }
         };
         let handle = spawn(Box::new(device.clone()), link)?;
-        let ear = wearer.map(|_| Ear::of(&device, link)).transpose()?;
+        let ear = Ear::of(&device, link)?;
         Ok(Self {
             device,
             handle,
@@ -215,23 +228,49 @@ impl Glove {
     }
 }
 
-/// Calibrates the virtual person, and writes the profile where other verbs find it. Where that cannot be written the devices are of use
-/// all the same.
-fn keep_profile(wearer: &Wearer, interrupt: &Interrupt) -> Result<()> {
-    let done = wearer.calibrated(interrupt)?;
-    let saved = ProfileStore::usual().and_then(|store| store.save(&done.kept));
+/// Calibrates the virtual person, and writes the profile where other verbs find it; that of ideal sensors says that they sit straight.
+/// Where it cannot be written the devices are of use all the same.
+fn keep_profile(
+    wearer: Option<&Wearer>,
+    glove: &VirtualGlove,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let (kept, words) = match wearer {
+        Some(wearer) => {
+            let done = wearer.calibrated(interrupt)?;
+            let words = format!("of its person: {}", done.line());
+            (done.kept, words)
+        }
+        None => (straight(glove), "of sensors that sit straight".to_owned()),
+    };
+    let saved = ProfileStore::usual().and_then(|store| store.save(&kept));
     match saved {
-        Ok(path) => say!(
-            "profile  {}  of its person: {}",
-            path.display(),
-            done.line()
-        ),
+        Ok(path) => say!("profile  {}  {words}", path.display()),
         Err(failure) => {
-            say!("warning: the virtual person's profile is not kept: {failure}");
+            say!("warning: the glove's profile is not kept: {failure}");
             say!("  try: {}", failure.next_step());
         }
     }
     Ok(())
+}
+
+/// How ideal sensors sit.
+fn straight(glove: &VirtualGlove) -> Kept {
+    Kept {
+        bound: Bound {
+            profile: Profile::straight(Side::Right),
+            ids: ids(glove),
+        },
+        calibrated: rfc3339(SystemTime::now()),
+        quality: Quality {
+            verdict: "good".to_owned(),
+            fit_deg: 0.0,
+            ratio: 0.0,
+            tilt_deg: 0.0,
+            heading_deg: 0.0,
+            findings: Vec::new(),
+        },
+    }
 }
 
 /// A virtual gripper and the way to it.
