@@ -167,8 +167,8 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
         if let Some(hand) = &mut hand {
             hand.listen();
         }
-        if let Some(glove) = &glove {
-            glove.ear.listen();
+        if let Some(ear) = glove.as_ref().and_then(|glove| glove.ear.as_ref()) {
+            ear.listen();
         }
     }
     // Taking the handles down removes the links.
@@ -196,7 +196,7 @@ struct Glove {
     device: VirtualGlove,
     handle: Handle,
     /// Of the virtual person, or of a hand that can lie flat.
-    ear: Ear,
+    ear: Option<Ear>,
 }
 
 impl Glove {
@@ -213,7 +213,14 @@ impl Glove {
             }
         };
         let handle = spawn(Box::new(device.clone()), link)?;
-        let ear = Ear::of(&device, link)?;
+        // A path may be too long for a socket; the rest works without.
+        let ear = match Ear::of(&device, link) {
+            Ok(ear) => Some(ear),
+            Err(error) => {
+                say!("warning: {error:#}; the hand hears Enter alone");
+                None
+            }
+        };
         Ok(Self {
             device,
             handle,
