@@ -5,6 +5,7 @@ mod clutch;
 mod finished;
 mod shown;
 mod view;
+mod worn;
 
 use std::io::IsTerminal;
 use std::path::PathBuf;
@@ -12,8 +13,6 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::event::Kind;
-use glove::calibration::Bound;
-use glove::calibration::Step;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::live::{Key, Live};
@@ -357,42 +356,8 @@ impl Run {
             Key::Open => self.clutch.release(self.session.orders()),
             // One that is not taken says no word of having begun; who pressed it presses it again.
             Key::Calibrate => {
-                let before = self.ended();
-                let taken = self.session.order(self.flat(glove::timing::STILL_WAIT));
-                if let Some(person) = self.person.as_ref().filter(|_| taken) {
-                    person.ask(Step::FirstFlat);
-                    self.asked_flat = Some(before);
-                }
+                self.ask_flat();
             }
-        }
-    }
-
-    /// The glove's sensors do not sit straight: by `profile` they sit, if there is one.
-    pub fn wears(&mut self, profile: Option<Bound>) {
-        self.straight = false;
-        self.session.set_profile(profile);
-    }
-
-    /// Whether the glove's sensors sit straight and share a heading; else the bridge knows how they sit, or nobody does.
-    pub fn is_straight(&mut self, straight: bool) {
-        self.straight = straight;
-    }
-
-    /// Who lies flat when that is asked for.
-    pub fn has(&mut self, person: Option<Listener>) {
-        self.person = person;
-    }
-
-    fn ended(&self) -> u16 {
-        let seen = self.session.snapshot();
-        seen.map_or(0, |seen| seen.calibration.ended)
-    }
-
-    /// The order to take the flat hand within `wait`.
-    fn flat(&self, wait: bridge::Duration) -> Order {
-        match self.straight {
-            true => Order::CalibrateStraight(wait),
-            false => Order::FlatPose(wait),
         }
     }
 
@@ -415,10 +380,7 @@ impl Run {
         self.clutch.look(&*self.session);
         self.look_at_file_limit();
         self.look_at_events();
-        if self.asked_flat.is_some_and(|before| self.ended() != before) {
-            self.asked_flat = None;
-            self.person.iter().for_each(Listener::let_go);
-        }
+        self.look_at_flat();
         Ok(())
     }
 

@@ -6,7 +6,8 @@ mod calibrating;
 use std::fmt;
 
 use glove::calibration::Step;
-use glove::hand::Side;
+use glove::hand::{SEGMENT_COUNT, Side};
+use glove::imu::UniqueId;
 use host::calibration::virtual_person::VirtualPerson;
 use rig::PoseSource;
 use rig::glove::{Config, Honest, VirtualGlove};
@@ -66,6 +67,15 @@ impl Wearer {
     pub fn playing(&self, motion: Box<dyn PoseSource>) -> VirtualGlove {
         self.glove(Box::new(Playing::new(self.traits(), motion)))
     }
+}
+
+/// The unique ids of a virtual glove's sensors, as they are wired.
+pub fn ids(glove: &VirtualGlove) -> [UniqueId; SEGMENT_COUNT] {
+    /// Where a sensor has its id, on page 1.
+    const UNIQUE_ID: u8 = 0x50;
+    std::array::from_fn(|k| {
+        std::array::from_fn(|byte| glove.sensor_register(k, 1, UNIQUE_ID + byte as u8))
+    })
 }
 
 /// What a virtual person is asked for in a step.

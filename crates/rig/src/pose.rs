@@ -124,6 +124,15 @@ impl PoseSource for FlatFirst {
     fn lie_flat(&mut self, flat: bool) {
         self.asked = Some(flat);
     }
+
+    /// It knows two things: to lie flat, and to move.
+    fn ask(&mut self, task: Task) {
+        match task {
+            Task::Flat => self.lie_flat(true),
+            Task::Use(_) => self.lie_flat(false),
+            _ => {}
+        }
+    }
 }
 
 impl<F: FnMut(f64) -> [f32; 25] + Send> PoseSource for F {

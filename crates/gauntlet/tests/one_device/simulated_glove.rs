@@ -3,6 +3,7 @@
 use crate::support;
 
 use std::path::Path;
+use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use embedded_io::{Read, ReadReady, Write};
@@ -12,7 +13,8 @@ use glove::scan::{Config, Scanner};
 use glove::timing;
 use host::clock::Clock;
 use host::lines::port::{BAUD, Port};
-use support::{Simulation, json, kept_waiting, model, run};
+use rig::skip::{Need, skipped};
+use support::{Simulation, command, finish, json, kept_waiting, model};
 
 /// Channel 0 of the multiplexer, then the chip id of the sensor at 0x28.
 const CHIP_ID: [u8; 13] = [
@@ -77,9 +79,9 @@ fn the_hand_lies_flat_at_every_opening_of_the_port_and_moves_after_that() {
     }
 }
 
-#[test]
-fn an_honest_glove_drives_by_the_profile_that_simulate_wrote() {
-    let simulation = Simulation::with(true, Some("gripper"), &["--seed", "5"]);
+/// Drives by whatever profile `simulate` wrote: the run, if this machine had time for it.
+fn driven(options: &[&str]) -> Option<serde_json::Value> {
+    let simulation = Simulation::with(true, Some("gripper"), options);
     let (glove, gripper) = (simulation.glove(), simulation.gripper());
     let teleop = [
         "teleop",
@@ -96,13 +98,23 @@ fn an_honest_glove_drives_by_the_profile_that_simulate_wrote() {
         "6",
         "--json",
     ];
-    let output = run(&teleop);
-    if kept_waiting(&output) {
-        return rig::skip::skipped(
-            rig::skip::Need::Machine,
-            "this machine had no time for a run",
-        );
+    let child = command(&teleop)
+        .env("GAUNTLET_CONFIG", simulation.config())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn();
+    let output = finish(child.unwrap());
+    (!kept_waiting(&output)).then(|| json(&output))
+}
+
+#[test]
+fn a_glove_of_either_kind_drives_by_the_profile_that_simulate_wrote() {
+    for options in [&["--seed", "5"][..], &["--ideal"]] {
+        let Some(said) = driven(options) else {
+            skipped(Need::Machine, "this machine had no time for a run");
+            continue;
+        };
+        let first = said["run"]["first_motion_s"].as_f64();
+        assert!(first.is_some(), "{options:?}: {said}");
     }
-    let said = json(&output);
-    assert!(said["run"]["first_motion_s"].as_f64().is_some(), "{said}");
 }

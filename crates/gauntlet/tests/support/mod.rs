@@ -233,6 +233,7 @@ impl Simulation {
         }
         arguments.extend(more);
         let mut child = command(&arguments)
+            .env("GAUNTLET_CONFIG", folder.path().join("config"))
             .stdout(Stdio::piped())
             .stderr(Stdio::inherit())
             .spawn()
@@ -249,6 +250,11 @@ impl Simulation {
     pub fn gripper_place(&self) -> String {
         let line = self.said.iter().find(|line| line.starts_with("gripper"));
         line.unwrap().split_whitespace().nth(1).unwrap().to_owned()
+    }
+
+    /// The folder with the profile that it wrote.
+    pub fn config(&self) -> String {
+        self.path("config")
     }
 
     pub fn glove(&self) -> String {

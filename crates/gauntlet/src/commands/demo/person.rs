@@ -2,13 +2,12 @@
 
 use anyhow::Result;
 use glove::calibration::Bound;
-use glove::hand::SEGMENT_COUNT;
-use glove::imu::UniqueId;
+use rig::glove::VirtualGlove;
 
 use super::parts::{Stage, Virtual};
 use crate::commands::calibrate::session::{Leading, Led, Session};
 use crate::results::runs::Person;
-use crate::wearer::{Listener, Wearer};
+use crate::wearer::{Listener, Wearer, ids};
 use host::calibration::{Judged, Kept};
 use host::clock::{Clock, rfc3339};
 use host::failure::Failure;
@@ -81,16 +80,7 @@ fn good(judged: &Judged) -> usize {
         .count()
 }
 
-/// The ids that this glove's sensors have.
-fn ids(glove: &rig::glove::VirtualGlove) -> [UniqueId; SEGMENT_COUNT] {
-    /// Where a sensor has its unique id, on page 1.
-    const UNIQUE_ID: u8 = 0x50;
-    std::array::from_fn(|k| {
-        std::array::from_fn(|byte| glove.sensor_register(k, 1, UNIQUE_ID + byte as u8))
-    })
-}
-
-fn fits(kept: &Kept, seed: u64, glove: &rig::glove::VirtualGlove) -> Result<()> {
+fn fits(kept: &Kept, seed: u64, glove: &VirtualGlove) -> Result<()> {
     let Err(misfit) = kept.bound.fits(&ids(glove).map(Some)) else {
         return Ok(());
     };

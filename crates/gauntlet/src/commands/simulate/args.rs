@@ -38,7 +38,7 @@ heading of its own that drifts, noise, flipped bits. Its virtual person is calib
 profile written where `teleop` finds it by the sensors' ids. The person does by itself what other verbs ask for at this path. \
 The hand lies flat for 3 s when the glove's port is opened, then it moves; \
 Enter lays it flat at any time, and Enter again lets it move. \
-With --ideal the sensors sit straight and share a heading, as no real ones do: `teleop` takes them with --ideal, too. \
+With --ideal the sensors sit straight and share a heading, as no real ones do; their profile says so. \
 Runs until interrupted (Ctrl-C) and takes the links away.")]
 pub struct Simulate {
     /// Link the virtual glove here. Without a path for either device both are made, at /tmp/glove and /tmp/gripper.

@@ -13,6 +13,7 @@ use rig::pty::{Handle, PtyDevice};
 
 use crate::heard::Ear;
 use crate::played;
+use crate::say;
 use crate::wearer::Wearer;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
@@ -26,11 +27,19 @@ use host::training::motion::Motion;
 /// How often the sensors are looked at while they boot (650 ms).
 const LOOK: Duration = Duration::from_millis(20);
 
+/// The hand's x is level and its y up, w x y z.
+const PALM_DOWN: [f32; 4] = [
+    std::f32::consts::FRAC_1_SQRT_2,
+    std::f32::consts::FRAC_1_SQRT_2,
+    0.0,
+    0.0,
+];
+
 /// A virtual glove behind a pseudo-terminal.
 pub(super) struct Glove {
     pub device: VirtualGlove,
     handle: Handle,
-    /// Of the virtual person.
+    /// Of the virtual person, or of a hand that can lie flat.
     pub ear: Option<Ear>,
 }
 
@@ -40,12 +49,22 @@ impl Glove {
         let device = match wearer {
             Some(wearer) => wearer.playing(played::source(motion)),
             None => {
-                let config = rig::glove::Config::at_baud(BAUD);
+                let config = rig::glove::Config {
+                    world: PALM_DOWN,
+                    ..rig::glove::Config::at_baud(BAUD)
+                };
                 VirtualGlove::new(played::virtual_hand(motion), config)
             }
         };
         let handle = spawn(Box::new(device.clone()), link)?;
-        let ear = wearer.map(|_| Ear::of(&device, link)).transpose()?;
+        // A path may be too long for a socket; the rest works without.
+        let ear = match Ear::of(&device, link) {
+            Ok(ear) => Some(ear),
+            Err(error) => {
+                say!("warning: {error:#}; the hand hears Enter alone");
+                None
+            }
+        };
         Ok(Self {
             device,
             handle,

@@ -5,9 +5,12 @@ mod args;
 mod devices;
 
 use std::io::IsTerminal;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use anyhow::Result;
+use glove::calibration::{Bound, Profile};
+use glove::hand::Side;
+use rig::glove::VirtualGlove;
 
 pub use args::Simulate;
 pub(super) use devices::family;
@@ -15,9 +18,11 @@ pub(super) use devices::family;
 use crate::flat_hand::Hand;
 use crate::progress::Person;
 use crate::say;
-use crate::wearer::Wearer;
+use crate::wearer::{Wearer, ids};
 use devices::{Glove, Gripper};
-use host::calibration::ProfileStore;
+use host::calibration::profile_file::Quality;
+use host::calibration::{Kept, ProfileStore};
+use host::clock::rfc3339;
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::probe;
@@ -45,8 +50,8 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
         };
         say!("glove    {}", glove.describe(&sensors, &motion));
     }
-    if let (Some(wearer), Some(_)) = (&wearer, &glove) {
-        keep_profile(wearer, interrupt)?;
+    if let Some(glove) = &glove {
+        keep_profile(wearer.as_ref(), &glove.device, interrupt)?;
     }
     let gripper = gripper_place
         .map(|place| Gripper::start(place, model))
@@ -80,21 +85,47 @@ pub(crate) fn run(options: &Simulate, interrupt: &Interrupt) -> Result<()> {
     Ok(())
 }
 
-/// Calibrates the virtual person, and writes the profile where other verbs find it. Where that cannot be written the devices are of use
-/// all the same.
-fn keep_profile(wearer: &Wearer, interrupt: &Interrupt) -> Result<()> {
-    let done = wearer.calibrated(interrupt)?;
-    let saved = ProfileStore::usual().and_then(|store| store.save(&done.kept));
+/// Calibrates the virtual person, and writes the profile where other verbs find it; that of ideal sensors says that they sit straight.
+/// Where it cannot be written the devices are of use all the same.
+fn keep_profile(
+    wearer: Option<&Wearer>,
+    glove: &VirtualGlove,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let (kept, words) = match wearer {
+        Some(wearer) => {
+            let done = wearer.calibrated(interrupt)?;
+            let words = format!("of its person: {}", done.line());
+            (done.kept, words)
+        }
+        None => (straight(glove), "of sensors that sit straight".to_owned()),
+    };
+    let saved = ProfileStore::usual().and_then(|store| store.save(&kept));
     match saved {
-        Ok(path) => say!(
-            "profile  {}  of its person: {}",
-            path.display(),
-            done.line()
-        ),
+        Ok(path) => say!("profile  {}  {words}", path.display()),
         Err(failure) => {
-            say!("warning: the virtual person's profile is not kept: {failure}");
+            say!("warning: the glove's profile is not kept: {failure}");
             say!("  try: {}", failure.next_step());
         }
     }
     Ok(())
+}
+
+/// How ideal sensors sit.
+fn straight(glove: &VirtualGlove) -> Kept {
+    Kept {
+        bound: Bound {
+            profile: Profile::straight(Side::Right),
+            ids: ids(glove),
+        },
+        calibrated: rfc3339(SystemTime::now()),
+        quality: Quality {
+            verdict: "good".to_owned(),
+            fit_deg: 0.0,
+            ratio: 0.0,
+            tilt_deg: 0.0,
+            heading_deg: 0.0,
+            findings: Vec::new(),
+        },
+    }
 }
