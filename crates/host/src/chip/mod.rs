@@ -1,7 +1,8 @@
-//! A bridge on a chip: the host protocol, and the chip as an emulator has it.
+//! A bridge on a chip: the host protocol, its glove's scans, and the chip as an emulator has it.
 
 pub mod emulator;
 pub mod link;
+pub mod scans;
 
 use crate::next::Command;
 

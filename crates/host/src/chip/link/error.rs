@@ -50,6 +50,15 @@ pub enum Error {
         /// The bridge's version.
         bridge: u16,
     },
+    /// Its firmware is of before this was there, in the same version of the protocol.
+    #[error("the bridge knows nothing of {what}: its firmware is older than this tool")]
+    Lacks {
+        /// What was asked for.
+        what: &'static str,
+    },
+    /// It started anew in the middle of what needs it to go on.
+    #[error("the bridge restarted in the middle of it, and its sensors' headings are others since")]
+    Restarted,
     /// It answered something else than was asked.
     #[error("the bridge answered {0}, which is no answer to what it was asked")]
     Confused(String),
@@ -163,6 +172,10 @@ impl Error {
             Self::Older { .. } => advice("this release's firmware in the bridge: ")
                 .then(crate::chip::firmware())
                 .then(" builds it; weights can be flashed as it is"),
+            Self::Lacks { .. } => advice("this release's firmware in the bridge: ")
+                .then(crate::chip::firmware())
+                .then(" builds it"),
+            Self::Restarted => "the bridge's power; then the same command again".into(),
             Self::Silent { heard, .. } if heard.echoes > 0 => {
                 "the wiring: the line sends back what is sent to it, and no bridge answers; TX and RX bridged, or a program that echoes".into()
             }

@@ -232,8 +232,17 @@ impl HostLink {
 
     /// The next reply by `deadline`, which no stream of bytes puts off; samples on the way are kept.
     fn receive(&mut self, deadline: Instant) -> Result<Option<Reply>, Error> {
+        self.receive_until(deadline, |_| false)
+    }
+
+    /// The same, or less where `enough` has come; `None` then.
+    fn receive_until(
+        &mut self,
+        deadline: Instant,
+        enough: impl Fn(&Self) -> bool,
+    ) -> Result<Option<Reply>, Error> {
         let mut byte = [0];
-        while Instant::now() < deadline {
+        while !enough(self) && Instant::now() < deadline {
             let line = self.line.as_mut().ok_or(Error::Lost)?;
             match line.read(&mut byte, deadline) {
                 Ok(0) => return Ok(None),

@@ -95,6 +95,17 @@ impl HostLink {
         Ok(self.scans.drain(..).collect())
     }
 
+    /// The next scan, waited for until `deadline`, which no stream of bytes puts off.
+    ///
+    /// # Errors
+    /// The line's fault.
+    pub fn next_scan(&mut self, deadline: Instant) -> Result<Option<Scan>, Error> {
+        // Replies that come now answer requests given up before.
+        let is_there = |link: &Self| !link.scans.is_empty();
+        while self.receive_until(deadline, is_there)?.is_some() {}
+        Ok(self.scans.pop_front())
+    }
+
     /// Whether flat poses are found while the hand works.
     ///
     /// # Errors
