@@ -380,7 +380,7 @@ fn results_of_bridges_keep_their_names() {
 #[test]
 fn results_of_gloves_keep_their_names() {
     let scanned = || gloves::Scanned {
-        baud: 115_200,
+        baud: Some(115_200),
         scans: 350,
         scans_per_s: 35.0,
         interval_p50_us: Some(28_000),
@@ -608,7 +608,7 @@ fn calibrations_and_settings() {
     let pose = calibrations::FlatPose {
         place: "/dev/ttyUSB0".to_owned(),
         profile: "glove-0a1b2c3d.toml".to_owned(),
-        calibrated: "2026-11-29T11:22:33Z".to_owned(),
+        calibrated: Some("2026-11-29T11:22:33Z".to_owned()),
         findings: vec![finding()],
         failure: Some(Told::of(&error)),
     };

@@ -131,8 +131,8 @@ pub struct FlatPose {
     pub place: String,
     /// The profile's file.
     pub profile: String,
-    /// When it was made, RFC 3339.
-    pub calibrated: String,
+    /// When it was made, RFC 3339; `null` where a bridge on a chip keeps it, which does not know.
+    pub calibrated: Option<String>,
     /// Sensors that lie otherwise than they were calibrated.
     pub findings: Vec<Finding>,
     /// Why it failed; `null` where it did not.

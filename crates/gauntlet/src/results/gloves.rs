@@ -4,6 +4,7 @@ use std::fmt::Write;
 
 use glove::hand::SEGMENT_NAMES;
 use glove::imu;
+use host::chip::scans::Counted;
 use host::failure::Told;
 use host::next::{NextStep, Warning};
 use host::scanning::Snapshot;
@@ -35,8 +36,8 @@ pub struct Watched {
 /// How often a glove was read.
 #[derive(Debug, Default, Serialize)]
 pub struct Scanned {
-    /// Speed of its line.
-    pub baud: u32,
+    /// Speed of its line; `null` where a bridge on a chip reads it.
+    pub baud: Option<u32>,
     /// Scans of all 16 sensors.
     pub scans: u64,
     /// From the first to the last.
@@ -49,7 +50,7 @@ pub struct Scanned {
     pub interval_max_us: Option<u64>,
     /// How far 99 of 100 intervals stay from the one before.
     pub jitter_us: Option<u64>,
-    /// Scans that this computer was too busy to take.
+    /// Scans that this computer was too busy to take, or that the line from a bridge on a chip lost.
     pub not_taken: u64,
     /// How often the port went away.
     pub unplugged: u64,
@@ -58,7 +59,7 @@ pub struct Scanned {
 impl From<&Snapshot> for Scanned {
     fn from(seen: &Snapshot) -> Self {
         Self {
-            baud: seen.baud,
+            baud: Some(seen.baud),
             scans: seen.frames,
             scans_per_s: seen.mean_rate,
             interval_p50_us: seen.interval_us.map(|[median, ..]| median),
@@ -67,6 +68,22 @@ impl From<&Snapshot> for Scanned {
             jitter_us: seen.jitter_us,
             not_taken: seen.not_taken,
             unplugged: seen.unplugged,
+        }
+    }
+}
+
+impl From<&Counted> for Scanned {
+    fn from(seen: &Counted) -> Self {
+        Self {
+            baud: None,
+            scans: seen.scans,
+            scans_per_s: seen.mean_rate,
+            interval_p50_us: seen.interval_us.map(|[median, ..]| median),
+            interval_p99_us: seen.interval_us.map(|[_, most, _]| most),
+            interval_max_us: seen.interval_us.map(|[.., longest]| longest),
+            jitter_us: None,
+            not_taken: seen.lost,
+            unplugged: 0,
         }
     }
 }

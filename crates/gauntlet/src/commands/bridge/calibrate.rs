@@ -3,17 +3,19 @@
 use std::path::Path;
 
 use anyhow::Result;
-use bridge::calibration::{Refusal, Try};
+use bridge::calibration::{CalibrationState, Refusal, Try};
 use bridge::protocol::message::Health;
 
 use super::args::BridgeAt;
 use super::drive::{Flat, start};
 use crate::results::{self, devices};
 use crate::tell::Tell;
+use crate::wearer::Listener;
 use host::calibration::Kept;
+use host::chip::link::HostLink;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
-use host::session::refused;
+use host::session::{Devices, refused};
 
 pub(super) fn undo(at: &BridgeAt) -> Result<()> {
     let tell = Tell::new(at.json);
@@ -49,14 +51,7 @@ pub(super) fn calibrate(
             path.display()
         ));
     }
-    let mut run = start(link, None, at.devices(), interrupt)?;
-    run.is_straight(flat.ideal);
-    let taken = run.calibrate(&tell).and_then(|taken| match taken {
-        true => Ok(()),
-        false => Err(Failure::interrupted("before the hand was taken").into()),
-    });
-    let now = run.snapshot().map(|seen| seen.calibration);
-    run.finish().judge_prepared(taken)?;
+    let now = flat_pose(link, at.devices(), flat.ideal, None, &tell, interrupt)?;
     if at.json {
         let calibration = now.unwrap_or(health.calibration);
         let health = Health {
@@ -66,4 +61,28 @@ pub(super) fn calibrate(
         return results::print("bridge calibrate", devices::Calibrated { health: &health });
     }
     Ok(())
+}
+
+/// Takes the flat hand, waited for as long as it takes to lie still; what the bridge then says of its calibration.
+///
+/// # Errors
+/// Why it was not taken; the line's fault; that the end was asked for.
+pub(in crate::commands) fn flat_pose(
+    link: HostLink,
+    devices: Devices,
+    is_straight: bool,
+    person: Option<Listener>,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<Option<CalibrationState>> {
+    let mut run = start(link, None, devices, interrupt)?;
+    run.is_straight(is_straight);
+    run.has(person);
+    let taken = run.calibrate(tell).and_then(|taken| match taken {
+        true => Ok(()),
+        false => Err(Failure::interrupted("before the hand was taken").into()),
+    });
+    let now = run.snapshot().map(|seen| seen.calibration);
+    run.finish().judge_prepared(taken)?;
+    Ok(now)
 }

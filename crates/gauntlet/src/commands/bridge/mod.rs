@@ -19,6 +19,7 @@ use host::interrupt::Interrupt;
 use host::next::advice;
 
 pub use args::{Bridge, BridgeAt, BridgeVerb};
+pub(super) use calibrate::flat_pose;
 pub(super) use drive::start;
 
 /// For the bridge to see that its clutch was opened.

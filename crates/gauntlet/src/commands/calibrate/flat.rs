@@ -1,23 +1,23 @@
 //! `gauntlet calibrate --flat`: one flat pose with the profile there is. It shows whether a sensor has slipped since.
 
-use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
-use glove::calibration::Step;
+use glove::calibration::{Bound, Step};
 use glove::headings::NotFlat;
 
 use super::Calibrate;
+use super::source::{Place, Source};
+use crate::commands::bridge::flat_pose;
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
+use crate::wearer::Listener;
 use host::calibration::guide::{Finding, FlatPose, PoseEnd, slipped};
+use host::calibration::profile_of;
 use host::calibration::virtual_person::VirtualPerson;
-use host::calibration::{Kept, profile_of};
-use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
-use host::next::Command;
-use host::scanning::Scanning;
+use host::session::Devices;
 
 /// Pause between two looks.
 const ROUND: Duration = Duration::from_millis(20);
@@ -28,38 +28,17 @@ const TRIES: usize = 3;
 ///
 /// # Errors
 /// No profile is of this glove; the hand did not lie flat; a sensor has slipped.
-pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()> {
+pub(super) fn run(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
-    let at = options.at(glove);
-    let clock = Clock::start();
-    let (mut scanning, _) = at.read(&tell, clock, interrupt)?;
-    let ids = scanning
-        .snapshot()
-        .map(|seen| seen.ids())
-        .unwrap_or_default();
-    let (path, kept) = profile_of(at.profile.as_deref(), &ids)?.map_err(|why| {
-        let calibrate = Command::gauntlet("calibrate").path("--glove", glove);
-        Failure::new(
-            format!("the glove on {}: {why}", glove.display()),
-            calibrate,
-        )
-    })?;
-    tell.say(format_args!(
-        "profile    {}  of {}",
-        path.display(),
-        kept.calibrated
-    ));
-    let person = VirtualPerson::at(glove);
-    let end = take(
-        &kept,
-        &mut scanning,
-        clock,
-        person.as_ref(),
-        &tell,
-        interrupt,
-    );
-    // What ended it before is told.
-    let _ = scanning.stop();
+    let (mut source, _) = place.open(&tell, interrupt)?;
+    let known = known(options, place, &mut source)?;
+    match &known.calibrated {
+        Some(when) => tell.say(format_args!("profile    {}  of {when}", known.place)),
+        None => tell.say(format_args!("profile    {}", known.place)),
+    }
+    let person = place.person();
+    let end = take(&known.bound, &mut source, person.as_ref(), &tell, interrupt);
+    let link = source.end();
     if let Some(person) = &person {
         person.let_go();
     }
@@ -67,7 +46,7 @@ pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> R
         PoseEnd::Taken(report) => slipped(&report),
         PoseEnd::NotFlat(NotFlat::Tilted { segment, by }) => vec![tilted(segment, by)],
         PoseEnd::NotFlat(not_flat) => {
-            return Err(Failure::new(not_flat.to_string(), at.doctor()).into());
+            return Err(Failure::new(not_flat.to_string(), place.doctor()).into());
         }
         PoseEnd::Moved(remark) => {
             let what = format!("no flat pose in {TRIES} tries: {remark}");
@@ -85,18 +64,61 @@ pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> R
             "flat       every sensor lies as it was calibrated"
         ));
     }
+    let judged = judged.and_then(|()| match (place, link) {
+        (Place::Chip(bridge), Some(link)) => {
+            let link = link.map_err(|error| error.at(bridge))?;
+            let person = place.person().map(Listener::There);
+            let devices = Devices::Chip((*bridge).clone());
+            flat_pose(link, devices, false, person, &tell, interrupt).map(drop)
+        }
+        _ => Ok(()),
+    });
     let (judgement, failure) = results::judged(judged);
     if options.json {
         let result = calibrations::FlatPose {
-            place: glove.display().to_string(),
-            profile: path.display().to_string(),
-            calibrated: kept.calibrated.clone(),
+            place: place.name(),
+            profile: known.place,
+            calibrated: known.calibrated,
             findings,
             failure,
         };
         results::print("calibrate --flat", result)?;
     }
     judgement
+}
+
+/// The profile there is.
+struct Known {
+    bound: Bound,
+    place: String,
+    calibrated: Option<String>,
+}
+
+/// The one that a chip keeps, or that is found here.
+fn known(options: &Calibrate, place: &Place<'_>, source: &mut Source) -> Result<Known> {
+    let ids = source.ids();
+    let none = |why: String| {
+        let what = format!("the glove on {}: {why}", place.name());
+        Failure::new(what, place.command("calibrate"))
+    };
+    if let Source::Chip { scans, address } = source {
+        let kept = scans.profile().map_err(|error| error.at(address))?;
+        let bound = kept.ok_or_else(|| none("the bridge keeps no profile of it".to_owned()))?;
+        bound
+            .fits(&ids)
+            .map_err(|misfit| none(misfit.to_string()))?;
+        return Ok(Known {
+            bound,
+            place: "in the bridge".to_owned(),
+            calibrated: None,
+        });
+    }
+    let (path, kept) = profile_of(options.profile.as_deref(), &ids)?.map_err(none)?;
+    Ok(Known {
+        bound: kept.bound,
+        place: path.display().to_string(),
+        calibrated: Some(kept.calibrated),
+    })
 }
 
 fn tilted(segment: u8, by: f32) -> Finding {
@@ -112,37 +134,33 @@ fn tilted(segment: u8, by: f32) -> Finding {
 }
 
 fn take(
-    kept: &Kept,
-    scanning: &mut Scanning,
-    clock: Clock,
+    bound: &Bound,
+    source: &mut Source,
     person: Option<&VirtualPerson>,
     tell: &Tell,
     interrupt: &Interrupt,
 ) -> Result<PoseEnd> {
     let mut tries = 0;
     loop {
-        scanning.waiting().for_each(drop);
+        source.begin()?;
         tell.say(format_args!(
             "flat       lay your hand flat on the table, fingers straight and together; hold still for 2 s"
         ));
         if let Some(person) = person {
             person.ask(Step::FirstFlat);
         }
-        let mut pose = FlatPose::new(&kept.bound.profile, clock.now());
+        let mut pose = FlatPose::new(&bound.profile, source.now());
         let end = loop {
-            let mut scanned = scanning.next(ROUND);
+            let mut scanned = source.next(ROUND)?;
             while let Some(scan) = scanned {
                 pose.take(&scan.frame, &scan.starts);
-                scanned = scanning.next(Duration::ZERO);
+                scanned = source.next(Duration::ZERO)?;
             }
-            if let Some(end) = pose.pass(clock.now()) {
+            if let Some(end) = pose.pass(source.now()) {
                 break end;
             }
             if interrupt.asked() {
                 return Err(Failure::interrupted("before the flat pose was taken").into());
-            }
-            if !scanning.running() {
-                return Err(scanning.ended());
             }
         };
         tries += 1;

@@ -3,31 +3,35 @@
 mod flat;
 mod list;
 pub(in crate::commands) mod session;
+pub(in crate::commands) mod source;
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+use std::path::PathBuf;
 use std::time::SystemTime;
 
 use anyhow::Result;
 use clap::Args;
-use glove::calibration::{Misfit, Verdict};
+use glove::calibration::{Bound, Misfit, Verdict};
 use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES, Side};
 use glove::imu::UniqueId;
 
+use crate::commands::bridge::flat_pose;
 use crate::commands::glove::GloveAt;
 use crate::commands::teleop::Hand as WhichHand;
 use crate::outputs::{self, Kind};
-use crate::results::{self, calibrations, gloves};
+use crate::results::{self, calibrations};
 use crate::tell::Tell;
 use crate::wearer::Listener;
 use host::calibration::guide::Finding;
-use host::calibration::virtual_person::VirtualPerson;
 use host::calibration::{Judged, ProfileStore};
-use host::clock::{self, Clock};
+use host::chip::link::{Address, Error, HostLink};
+use host::clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::next::{Command, NextStep, advice};
-use host::scanning::Snapshot;
+use host::session::Devices;
 use session::{Leading, Led, Session};
+use source::{Place, give_by_hand};
 
 /// Options of `calibrate`.
 #[derive(Debug, Args)]
@@ -36,6 +40,7 @@ Examples:
   gauntlet calibrate --glove /dev/ttyUSB0                 the guided session, a minute
   gauntlet calibrate --glove /dev/ttyUSB0 --hand left     … and the glove must turn out to be a left one
   gauntlet calibrate --glove /dev/ttyUSB0 --flat          next day: does the profile still fit?
+  gauntlet calibrate --bridge /dev/ttyACM0                the glove of a bridge on a chip, which keeps the profile
   gauntlet calibrate --list                               the profiles that are there
 
 Wear the glove and sit at a table. The hand lies flat, turns, lies flat, bends one finger after the other, makes fists, \
@@ -45,9 +50,12 @@ The profile goes into a file bound to the sensors' unique ids, where `teleop` fi
 It is written when every check holds or leaves doubts; what is bad is not, but with --keep-anyway. \
 A virtual glove's person does what is asked by itself (`gauntlet simulate`). Exit code 1 where nothing is kept.")]
 pub struct Calibrate {
-    /// The glove's serial port; needed but for --list.
+    /// The glove's serial port; needed but for --bridge and --list.
     #[arg(long, value_name = "PORT")]
     pub glove: Option<PathBuf>,
+    /// The glove of the bridge on a chip there: a serial port, unix:PATH or tcp:HOST:PORT. The bridge keeps the profile, too.
+    #[arg(long, value_name = "PORT", conflicts_with_all = ["glove", "list", "profile"])]
+    pub bridge: Option<Address>,
     /// Which hand should wear it; a glove that turns out to be on the other one is refused.
     #[arg(long, value_enum)]
     pub hand: Option<WhichHand>,
@@ -79,15 +87,23 @@ pub struct Calibrate {
 /// # Errors
 /// A failure that names the port, the sensor or the file; that nothing was kept, and why.
 pub(crate) fn run(options: &Calibrate, interrupt: &Interrupt) -> Result<()> {
-    match &options.glove {
-        _ if options.list => list::run(options.json),
-        Some(glove) if options.flat => flat::run(options, glove, interrupt),
-        Some(glove) => guided(options, glove, interrupt),
-        None => Err(Failure::usage(
-            "no glove is named",
-            advice("--glove PORT; ").then(Command::gauntlet("ports").then(" lists them")),
-        )
-        .into()),
+    if options.list {
+        return list::run(options.json);
+    }
+    let place = match (&options.bridge, &options.glove) {
+        (Some(bridge), _) => Place::Chip(bridge),
+        (None, Some(glove)) => Place::Port(options.at(glove)),
+        (None, None) => {
+            return Err(Failure::usage(
+                "no glove is named",
+                advice("--glove PORT; ").then(Command::gauntlet("ports").then(" lists them")),
+            )
+            .into());
+        }
+    };
+    match options.flat {
+        true => flat::run(options, &place, interrupt),
+        false => guided(options, &place, interrupt),
     }
 }
 
@@ -112,13 +128,15 @@ impl Calibrate {
 }
 
 /// The ids of a whole glove.
-fn ids(seen: Option<&Snapshot>, at: &GloveAt) -> Result<[UniqueId; SEGMENT_COUNT], Failure> {
-    let ids = seen.map_or([None; SEGMENT_COUNT], Snapshot::ids);
+fn whole(
+    ids: &[Option<UniqueId>; SEGMENT_COUNT],
+    at: &Place<'_>,
+) -> Result<[UniqueId; SEGMENT_COUNT], Failure> {
     let lacks: Vec<&str> = (0..SEGMENT_COUNT)
         .filter(|&k| ids[k].is_none())
         .map(|k| SEGMENT_NAMES[k])
         .collect();
-    let place = at.glove.display();
+    let place = at.name();
     if !lacks.is_empty() {
         let what = format!(
             "a profile is bound to its sensors' unique ids, and the glove on {place} has none of {}",
@@ -139,32 +157,31 @@ fn ids(seen: Option<&Snapshot>, at: &GloveAt) -> Result<[UniqueId; SEGMENT_COUNT
     }
 }
 
-fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()> {
+fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     if let Some(out) = &options.out {
         outputs::check(out, Kind::Profile, &[])?;
     }
-    let at = options.at(glove);
-    let clock = Clock::start();
-    let (scanning, missing) = at.read(&tell, clock, interrupt)?;
+    let (source, missing) = place.open(&tell, interrupt)?;
     if missing > 0 {
         let what = format!(
             "the glove on {} lacks sensors, and a calibration needs all 16",
-            glove.display()
+            place.name()
         );
-        return Err(Failure::new(what, at.doctor()).into());
+        return Err(Failure::new(what, place.doctor()).into());
     }
-    let ids = ids(scanning.snapshot().as_ref(), &at)?;
+    let ids = whole(&source.ids(), place)?;
     let leading = Leading {
         declared: options.declared(),
         keep_anyway: options.keep_anyway,
         by_itself: false,
         json: options.json,
     };
-    let person = VirtualPerson::at(glove).map(Listener::There);
-    let mut session = Session::new(scanning, clock, leading, person);
+    let person = place.person().map(Listener::There);
+    let mut session = Session::new(source, leading, person);
     let led = session.lead(&tell, interrupt);
-    let done = session.finish();
+    let mut done = session.finish();
+    let link = done.link.take();
     let mut kept = None;
     let decided = led.and_then(|led| match led {
         Led::Stopped => Err(Failure::new(
@@ -176,7 +193,9 @@ fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()
             let what = format!("the calibration came to nothing: {unfinished}");
             Err(Failure::new(
                 what,
-                at.doctor().then(" looks at the glove; then the same again"),
+                place
+                    .doctor()
+                    .then(" looks at the glove; then the same again"),
             )
             .into())
         }
@@ -188,15 +207,24 @@ fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()
                 Some(path) => profile.write(path).map(|()| path.clone()),
                 None => ProfileStore::usual().and_then(|store| store.save(&profile)),
             };
-            kept = Some(path?);
-            Ok(())
+            let path = kept.insert(path?);
+            match (place, link) {
+                (Place::Chip(bridge), Some(link)) => {
+                    give(link, bridge, &profile.bound, path, &tell, interrupt)
+                }
+                _ => Ok(()),
+            }
         }
     });
-    let next = next(glove);
+    let next = next(place);
     if let (Some(judged), false) = (&done.judged, options.json) {
         lines(judged)
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
+    }
+    let (scans, lost) = (done.scanned.scans, done.scanned.not_taken);
+    if lost > 0 {
+        tell.say(format_args!("scans      {scans} came, {lost} were lost"));
     }
     if let (Some(path), false) = (&kept, options.json) {
         tell.say(format_args!("profile    {}", path.display()));
@@ -207,15 +235,12 @@ fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()
         results::print(
             "calibrate",
             calibrations::Calibrated::of(
-                glove.display().to_string(),
+                place.name(),
                 done.judged.as_ref(),
                 kept.as_deref(),
                 done.again,
                 done.took_s,
-                done.seen
-                    .as_ref()
-                    .map(gloves::Scanned::from)
-                    .unwrap_or_default(),
+                done.scanned,
                 next,
                 failure,
             ),
@@ -225,11 +250,42 @@ fn guided(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> Result<()
 }
 
 /// What one does with a calibrated glove.
-fn next(glove: &Path) -> NextStep {
-    Command::gauntlet("record")
-        .path("--glove", glove)
-        .option("--out", "my_hand.csv")
-        .then(" records the hand, to train a map on")
+fn next(place: &Place<'_>) -> NextStep {
+    match place {
+        Place::Port(_) => place
+            .command("record")
+            .option("--out", "my_hand.csv")
+            .then(" records the hand, to train a map on"),
+        Place::Chip(_) => place
+            .command("bridge log")
+            .option("--out", "my_hand.csv")
+            .then(" records the hand, to train a map on"),
+    }
+}
+
+/// Gives the profile to the bridge, which keeps it, and takes the flat pose there that gives the headings.
+fn give(
+    link: Result<HostLink, Error>,
+    bridge: &Address,
+    bound: &Bound,
+    path: &Path,
+    tell: &Tell,
+    interrupt: &Interrupt,
+) -> Result<()> {
+    let by_hand = || give_by_hand(path, bridge).then(" gives it to the bridge");
+    let not_kept = |error: Error| {
+        let what = format!(
+            "the profile is in {}, and not in the bridge: {error}",
+            path.display()
+        );
+        Failure::new(what, by_hand())
+    };
+    let mut link = link.map_err(not_kept)?;
+    link.set_profile(Some(bound)).map_err(not_kept)?;
+    tell.say(format_args!("bridge     keeps the profile"));
+    let person = Place::Chip(bridge).person().map(Listener::There);
+    let devices = Devices::Chip(bridge.clone());
+    flat_pose(link, devices, false, person, tell, interrupt).map(drop)
 }
 
 /// Whether it is kept. `agreed`: the person saw the verdict and wants it.

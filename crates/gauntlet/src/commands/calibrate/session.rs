@@ -6,18 +6,19 @@ use anyhow::Result;
 use glove::calibration::{Unfinished, Verdict};
 use glove::hand::Side;
 
+use super::source::Source;
 use crate::live::guided::GuideView;
 use crate::live::{Key, Live};
 use crate::out;
 use crate::results::calibrations::Repeated;
+use crate::results::gloves;
 use crate::tell::Tell;
 use crate::wearer::Listener;
 use host::calibration::guide::{News, PARTS, Remark, Stage, plan};
 use host::calibration::{Guide, Judged};
-use host::clock::Clock;
+use host::chip::link::{Error, HostLink};
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
-use host::scanning::{Scanning, Snapshot};
 
 /// Pause between two looks.
 const ROUND: Duration = Duration::from_millis(20);
@@ -40,7 +41,9 @@ pub(in crate::commands) struct Done {
     /// Steps that were asked for again, and why.
     pub again: Vec<Repeated>,
     pub took_s: f64,
-    pub seen: Option<Snapshot>,
+    pub scanned: gloves::Scanned,
+    /// The line to the chip, where the glove is a chip's.
+    pub link: Option<Result<HostLink, Error>>,
 }
 
 /// How it is led.
@@ -58,8 +61,7 @@ pub(in crate::commands) struct Leading {
 
 /// A session under way.
 pub(in crate::commands) struct Session {
-    scanning: Scanning,
-    clock: Clock,
+    source: Source,
     guide: Guide,
     person: Option<Listener>,
     keep_anyway: bool,
@@ -71,18 +73,9 @@ pub(in crate::commands) struct Session {
 }
 
 impl Session {
-    pub fn new(
-        scanning: Scanning,
-        clock: Clock,
-        leading: Leading,
-        person: Option<Listener>,
-    ) -> Self {
-        // What waited is of before.
-        scanning.waiting().for_each(drop);
-        scanning.begin();
+    pub fn new(source: Source, leading: Leading, person: Option<Listener>) -> Self {
         Self {
-            scanning,
-            clock,
+            source,
             guide: Guide::new(leading.declared),
             person,
             keep_anyway: leading.keep_anyway,
@@ -104,6 +97,7 @@ impl Session {
                 "person   a virtual one, who does what is asked"
             ));
         }
+        self.source.begin()?;
         let terminal = || "the terminal does not work".to_owned();
         let next = "the same with | cat behind it, which prints lines instead";
         // Without a terminal there are lines, but not those of a view.
@@ -116,7 +110,7 @@ impl Session {
             ));
         }
         if !drawn || self.by_itself {
-            self.guide.go_on(self.clock.now());
+            self.guide.go_on(self.source.now());
         }
         loop {
             self.round(tell, drawn)?;
@@ -131,8 +125,8 @@ impl Session {
                             return Ok(led);
                         }
                     }
-                    Key::Clutch | Key::Open => self.guide.go_on(self.clock.now()),
-                    Key::Again => self.guide.again(self.clock.now()),
+                    Key::Clutch | Key::Open => self.guide.go_on(self.source.now()),
+                    Key::Again => self.guide.again(self.source.now()),
                     Key::Calibrate => {}
                 }
             }
@@ -170,15 +164,12 @@ impl Session {
 
     /// Takes what came, and says what happened.
     fn round(&mut self, tell: &Tell, drawn: bool) -> Result<()> {
-        let mut scanned = self.scanning.next(ROUND);
+        let mut scanned = self.source.next(ROUND)?;
         while let Some(scan) = scanned {
             self.guide.take(&scan.frame, &scan.starts);
-            scanned = self.scanning.next(Duration::ZERO);
+            scanned = self.source.next(Duration::ZERO)?;
         }
-        if !self.scanning.running() {
-            return Err(self.scanning.ended());
-        }
-        self.guide.pass(self.clock.now());
+        self.guide.pass(self.source.now());
         while let Some(news) = self.guide.next_news() {
             self.hear(news, tell, drawn);
         }
@@ -225,7 +216,7 @@ impl Session {
     }
 
     fn say_remarks(&mut self, tell: &Tell) {
-        let ask = self.guide.ask(self.clock.now());
+        let ask = self.guide.ask(self.source.now());
         // While a step waits to be done again its reason was said.
         if !matches!(ask.stage, Stage::Doing(_)) {
             return;
@@ -246,20 +237,11 @@ impl Session {
     }
 
     fn view(&self) -> GuideView {
-        let seen = self.scanning.snapshot();
-        let glove = seen.map_or_else(String::new, |seen| {
-            format!(
-                "{} of 16 sensors, {:.1} scans/s, {} baud",
-                seen.good(),
-                seen.rate,
-                seen.baud
-            )
-        });
         let (end, good, keys) = self.end();
         GuideView {
             elapsed: self.started.elapsed(),
-            ask: self.guide.ask(self.clock.now()),
-            glove,
+            ask: self.guide.ask(self.source.now()),
+            glove: self.source.line(),
             end,
             good,
             keys,
@@ -296,15 +278,13 @@ impl Session {
     }
 
     /// Ends the reading.
-    pub fn finish(mut self) -> Done {
-        let seen = self.scanning.snapshot();
-        // What ended it before was told.
-        let _ = self.scanning.stop();
+    pub fn finish(self) -> Done {
         Done {
             judged: self.guide.ended().and_then(|ended| ended.clone().ok()),
             again: self.again,
             took_s: self.started.elapsed().as_secs_f64(),
-            seen,
+            scanned: self.source.scanned(),
+            link: self.source.end(),
         }
     }
 }

@@ -6,6 +6,7 @@ use rig::glove::VirtualGlove;
 
 use super::parts::{Stage, Virtual};
 use crate::commands::calibrate::session::{Leading, Led, Session};
+use crate::commands::calibrate::source::Source;
 use crate::results::runs::Person;
 use crate::wearer::{Listener, Wearer, ids};
 use host::calibration::{Judged, Kept};
@@ -112,7 +113,8 @@ fn shown(stage: Stage<'_>, devices: &Virtual) -> Result<(Bound, Person)> {
         ..Leading::default()
     };
     let person = Listener::Here(devices.glove.clone());
-    let mut session = Session::new(scanning, clock, leading, Some(person));
+    let source = Source::Port { scanning, clock };
+    let mut session = Session::new(source, leading, Some(person));
     let led = session.lead(tell, interrupt);
     let done = session.finish();
     let judged = match led? {
