@@ -7,7 +7,7 @@ use anyhow::Result;
 use glove::calibration::Step;
 use glove::headings::NotFlat;
 
-use super::Calibrate;
+use super::args::Calibrate;
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
 use host::calibration::guide::{Finding, FlatPose, PoseEnd, slipped};
