@@ -189,7 +189,7 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
             calibration: now.calibration,
             calibration_known: true,
             profile: Some(now.profile),
-            headings: now.profile.is_there.then(|| Headings {
+            headings: now.profile.is_there.then_some(Headings {
                 sigma: now.sigma,
                 drift: now.drift,
                 degraded: now.degraded,
