@@ -82,7 +82,7 @@ pub(super) fn run(options: &Calibrate, glove: &Path, interrupt: &Interrupt) -> R
     };
     if !options.json && findings.is_empty() {
         tell.say(format_args!(
-            "flat       every sensor lies as it was calibrated"
+            "flat       no sensor is tilted against its calibration; one turned about the vertical cannot be seen so"
         ));
     }
     let (judgement, failure) = results::judged(judged);
