@@ -1,4 +1,4 @@
-//! One entry for the project's chores: `cargo xtask setup | test | firmware | qemu | powercut | same-bits | bench | campaign | fuzz | docs`.
+//! One entry for the project's chores: `cargo xtask setup | test | firmware | qemu | powercut | same-bits | bench | figures | campaign | fuzz | docs`.
 //!
 //! The chores only start other programs (cargo, rustup, apt-get, qemu); what they check lives in the crates.
 

@@ -282,6 +282,24 @@ fn a_sensor_that_jumped_is_held_until_a_flat_pose() {
 }
 
 #[test]
+fn a_sensor_that_jumped_and_was_away_in_the_flat_pose_is_not_believed_when_it_is_back() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(2 * S);
+    bench.glove.slip(14, [0.0, 0.0, 1.0], 120.0);
+    bench.run(5 * S);
+    assert_eq!(bench.app.telemetry().distrusted, 1 << 14);
+    bench.release();
+    bench.glove.unplug(14, true);
+    bench.run(S);
+    lie_flat(&mut bench);
+    pose(&mut bench).expect("flat, as far as can be seen");
+    bench.glove.unplug(14, false);
+    bench.run(10 * S);
+    assert_eq!(bench.app.telemetry().distrusted, 1 << 14);
+    assert_eq!(bench.app.telemetry().held_joints, 0b11 << 23);
+}
+
+#[test]
 fn one_sensor_that_is_away_costs_its_joints_and_not_the_flat_pose() {
     let wearer = Wearer::new(1);
     let (mut bench, _) = wearing(&wearer);

@@ -5,46 +5,17 @@
 
 pub mod keys;
 pub mod place;
+mod value;
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 
-use serde::Serialize;
-
 use crate::failure::Failure;
 use crate::next::{Command, NextStep, advice};
 use crate::toml_file;
 pub use keys::{KEYS, Key, Kind, SECTIONS};
-
-/// A value.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(untagged)]
-pub enum Value {
-    /// Of a key that is no number.
-    Text(String),
-    /// A whole number.
-    Whole(i64),
-}
-
-impl std::fmt::Display for Value {
-    /// As an option on the command line has it.
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Text(text) => f.write_str(text),
-            Self::Whole(number) => write!(f, "{number}"),
-        }
-    }
-}
-
-impl Value {
-    fn toml(&self) -> String {
-        match self {
-            Self::Text(text) => toml_file::quoted(text),
-            Self::Whole(number) => number.to_string(),
-        }
-    }
-}
+pub use value::Value;
 
 /// The settings: what the file gives, and the defaults of the rest.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -102,14 +73,17 @@ impl Settings {
             if !SECTIONS.contains(&section.as_str()) {
                 let what = format!("[{section:.40}] is no section of the settings");
                 let nearest = keys::nearest(section, SECTIONS.iter().copied());
-                return Err(wrong(what, known(nearest.map(|near| format!("[{near}]")))));
+                return Err(wrong(
+                    what,
+                    keys::known(nearest.map(|near| format!("[{near}]"))),
+                ));
             }
             for (name, value) in content {
                 let Some(key) = KEYS.iter().find(|key| key.is(section, name)) else {
                     let what = format!("there is no setting `{section}.{name:.40}`");
                     let whole = format!("{section}.{name}");
                     let nearest = keys::nearest(&whole, KEYS.iter().map(|key| key.name));
-                    return Err(wrong(what, known(nearest.map(str::to_owned))));
+                    return Err(wrong(what, keys::known(nearest.map(str::to_owned))));
                 };
                 let value = key
                     .checked(value)
@@ -189,14 +163,6 @@ impl Settings {
 fn mend() -> NextStep {
     advice("mending that line, or taking it out; ")
         .then(Command::gauntlet("settings").then(" prints every key with its default"))
-}
-
-fn known(nearest: Option<String>) -> NextStep {
-    let all = Command::gauntlet("settings").then(" prints every key with its default");
-    match nearest {
-        Some(nearest) => advice(format!("{nearest}, if that is meant; ")).then(all),
-        None => all,
-    }
 }
 
 #[cfg(test)]

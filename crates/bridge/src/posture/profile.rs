@@ -108,7 +108,7 @@ impl Posture {
         }
     }
 
-    /// The flat pose is over: its headings are those of the profile's sensors, and every sensor is trusted again.
+    /// The flat pose is over: its headings are those of the profile's sensors, and every sensor that was seen in it is trusted again.
     ///
     /// # Errors
     /// [`NotFlat`]: everything is as it was.
@@ -121,11 +121,13 @@ impl Posture {
             self.lose_distrusted(now);
             return ended;
         }
+        // Who was away may have turned on its segment: the next pose that sees it tells.
+        let unseen = self.distrusted & worn.astray();
         if self.way == Way::Straight {
             self.calibrate(None);
             self.way = Way::Profile;
         }
-        (self.distrusted, self.beyond, self.impossible) = (0, 0, 0);
+        (self.distrusted, self.beyond, self.impossible) = (unseen, 0, 0);
         ended
     }
 

@@ -7,9 +7,10 @@ use ratatui::style::{Color, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph};
 
+use super::moving::Axis;
 use super::parts::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines};
 use super::small;
-use super::view::{Axis, View, count, old};
+use super::view::{View, count, old};
 use host::stats::short_or_dash;
 
 /// The least terminal for boxes: columns, rows.

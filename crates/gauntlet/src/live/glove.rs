@@ -10,9 +10,10 @@ use ratatui::widgets::{Block, Paragraph};
 
 use super::Scene;
 use super::draw::titled;
+use super::moving::Finger;
 use super::parts::{BOLD, DIM, Heading, fault_lines, hand_table, heading, key_lines, wrapped};
 use super::small::{hand_line, too_small};
-use super::view::{Finger, old};
+use super::view::old;
 use host::stats::short_or_dash;
 
 /// The least terminal for boxes: columns, rows.

@@ -7,6 +7,7 @@ pub mod glove;
 pub mod guided;
 mod key;
 mod keys;
+mod moving;
 mod parts;
 mod postures;
 mod raw;
@@ -21,8 +22,9 @@ use ratatui::layout::Rect;
 use ratatui::{Frame, Terminal, TerminalOptions, Viewport};
 
 pub use key::{Bindings, Key};
+pub use moving::{Axis, Finger};
 pub use small::LEAST;
-pub use view::{Axis, Finger, View};
+pub use view::View;
 
 use crate::{out, say};
 use host::clock::since_boot;

@@ -6,7 +6,7 @@ use ratatui::style::{Color, Modifier, Style};
 use ratatui::text::{Line, Span};
 
 use super::bars::{Cell, axis, signed};
-use super::view::{Axis, Finger};
+use super::moving::{Axis, Finger};
 use host::stats::seconds;
 
 pub(super) const DIM: Style = Style::new().add_modifier(Modifier::DIM);

@@ -5,8 +5,9 @@ use ratatui::style::{Color, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::Paragraph;
 
+use super::moving::Finger;
 use super::parts::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines, wrapped};
-use super::view::{Finger, View, count, old};
+use super::view::{View, count, old};
 use host::stats::short_or_dash;
 
 /// The least terminal that shows state, faults and axes: columns, rows.

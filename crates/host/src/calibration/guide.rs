@@ -7,6 +7,7 @@
 
 mod judged;
 mod judging;
+mod limits;
 pub mod plan;
 mod pose;
 mod remark;
@@ -21,7 +22,7 @@ use glove::{Duration, Instant};
 
 use crate::clock::since;
 pub use judged::{Again, Check, Finding, Joint, Judged};
-use judging::{ACROSS, is_flat};
+use limits::{ACROSS, is_flat};
 pub use plan::{PARTS, PLAN, Part};
 pub use pose::{FlatPose, PoseEnd, slipped};
 pub use remark::Remark;

@@ -41,24 +41,14 @@ pub fn profile_of(
     named: Option<&Path>,
     ids: &[Option<UniqueId>; SEGMENT_COUNT],
 ) -> Result<Result<(PathBuf, Box<Kept>), String>, Failure> {
-    let of_another = |path: &Path, misfit: Misfit| Ok(Err(format!("{}: {misfit}", path.display())));
     if let Some(path) = named {
         let kept = Kept::read(path)?;
-        return match kept.bound.fits(ids) {
-            Ok(()) => Ok(Ok((path.to_owned(), Box::new(kept)))),
-            Err(misfit) => of_another(path, misfit),
-        };
+        return Ok(match kept.bound.fits(ids) {
+            Ok(()) => Ok((path.to_owned(), Box::new(kept))),
+            Err(misfit) => Err(format!("{}: {misfit}", path.display())),
+        });
     }
-    let store = ProfileStore::usual()?;
-    match store.find(ids)? {
-        Found::Fits(path, kept) => Ok(Ok((path, kept))),
-        Found::Nearly(path, misfit) => of_another(&path, misfit),
-        Found::Untold(misfit) => Ok(Err(misfit.to_string())),
-        Found::Nothing => {
-            let folder = store.folder().display();
-            Ok(Err(format!("there is no profile of it in {folder}")))
-        }
-    }
+    ProfileStore::usual()?.profile_of(ids)
 }
 
 impl ProfileStore {
@@ -82,16 +72,37 @@ impl ProfileStore {
         &self.folder
     }
 
+    /// The profile of the glove with these ids, or why there is none to be used.
+    fn profile_of(
+        &self,
+        ids: &[Option<UniqueId>; SEGMENT_COUNT],
+    ) -> Result<Result<(PathBuf, Box<Kept>), String>, Failure> {
+        Ok(match self.find(ids)? {
+            // Whoever kept it wanted it; who wants to drive by it names it.
+            Found::Fits(path, kept) if kept.quality.verdict == "bad" => Err(format!(
+                "{} came out too bad to be used; --profile takes it all the same",
+                path.display()
+            )),
+            Found::Fits(path, kept) => Ok((path, kept)),
+            Found::Nearly(path, misfit) => Err(format!("{}: {misfit}", path.display())),
+            Found::Untold(misfit) => Err(misfit.to_string()),
+            Found::Nothing => Err(format!(
+                "there is no profile of it in {}",
+                self.folder.display()
+            )),
+        })
+    }
+
     /// The file of a glove with these ids.
     pub fn path_of(&self, ids: &[UniqueId; SEGMENT_COUNT]) -> PathBuf {
         let crc = crc::Crc::<u32>::new(&crc::CRC_32_ISO_HDLC).checksum(ids.as_flattened());
         self.folder.join(format!("glove-{crc:08x}.toml"))
     }
 
-    /// Keeps a profile in place of the glove's older one; returns its path.
+    /// Keeps a profile in place of the glove's older one, which stays beside it with `.before` behind its name; returns its path.
     ///
     /// # Errors
-    /// The folder cannot be made, or the file not be written.
+    /// The folder cannot be made, or a file not be written.
     pub fn save(&self, kept: &Kept) -> Result<PathBuf, Failure> {
         std::fs::create_dir_all(&self.folder).map_err(|error| {
             let what = format!(
@@ -102,6 +113,18 @@ impl ProfileStore {
             Failure::new(what, "another place for the profile, with --out FILE")
         })?;
         let path = self.path_of(&kept.bound.ids);
+        let before = path.with_extension("toml.before");
+        match std::fs::copy(&path, &before) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                let what = format!(
+                    "the profile before, {}, cannot be kept: {}",
+                    path.display(),
+                    words::disk(&error)
+                );
+                return Err(Failure::new(what, "another place, with --out FILE"));
+            }
+            _ => {}
+        }
         kept.write(&path)?;
         Ok(path)
     }
@@ -197,6 +220,24 @@ mod tests {
         // Saved anew it takes its own file's place.
         assert_eq!(store.save(&own).unwrap(), path);
         assert_eq!(store.list().unwrap().len(), 3);
+    }
+
+    #[test]
+    fn a_profile_that_came_out_bad_is_not_found_and_the_one_before_it_is_still_there() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = ProfileStore::at(folder.path());
+        let good = kept(1);
+        let ids = good.bound.ids.map(Some);
+        let path = store.save(&good).unwrap();
+        assert!(store.profile_of(&ids).unwrap().is_ok());
+        let mut bad = good.clone();
+        bad.quality.verdict = "bad".to_owned();
+        store.save(&bad).unwrap();
+        let why = store.profile_of(&ids).unwrap().unwrap_err();
+        assert!(why.contains("too bad to be used"), "{why}");
+        let before = path.with_extension("toml.before");
+        assert_eq!(Kept::read(&before).unwrap(), good);
+        assert_eq!(store.list().unwrap().len(), 1);
     }
 
     #[test]

@@ -2,6 +2,7 @@
 
 mod bridge_chip;
 mod bridge_line;
+mod exchange;
 mod i2c;
 mod own;
 mod sensors;

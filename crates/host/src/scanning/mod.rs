@@ -6,19 +6,18 @@
 
 mod bringup;
 mod hand;
+mod shared;
 mod snapshot;
 mod worker;
 
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::hand::SEGMENT_COUNT;
-use glove::imu::UniqueId;
-use glove::scan::{self, Finding, Frame};
+use glove::scan::{self, Finding};
 
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
@@ -28,25 +27,14 @@ use crate::realtime;
 
 pub use bringup::{BringUp, open};
 pub use hand::{Flat, Hand, Pose};
+pub use shared::Scanned;
+use shared::Shared;
 pub use snapshot::{Sensor, Snapshot};
 
 /// Frames that wait to be taken: three seconds at the fastest line.
 pub const QUEUE: usize = 256;
 /// Pause between two looks of a waiting caller.
 const LOOK: Duration = Duration::from_millis(20);
-
-/// One scan, and how often each sensor had started by then: a sensor that starts anew has another heading from there on.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Scanned {
-    /// The samples, with their stamps on the clock that [`Scanning::start`] was given.
-    pub frame: Frame,
-    /// When the scan was complete, on the same clock.
-    pub at: glove::Instant,
-    /// [`scan::Counters::starts`] at that time.
-    pub starts: [u16; SEGMENT_COUNT],
-    /// The sensors' unique ids as they were read by then, as wired.
-    pub ids: [Option<UniqueId>; SEGMENT_COUNT],
-}
 
 /// How a glove is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -66,21 +54,6 @@ impl Default for Settings {
             },
             queue: QUEUE,
         }
-    }
-}
-
-/// What the reading thread and its owner share.
-#[derive(Debug, Default)]
-pub(crate) struct Shared {
-    said: Mutex<snapshot::Said>,
-    stop: AtomicBool,
-    begin: AtomicBool,
-}
-
-impl Shared {
-    fn lock(&self) -> MutexGuard<'_, snapshot::Said> {
-        // Nothing panics while holding it; a poisoned lock still holds a valid value.
-        self.said.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
 

@@ -8,8 +8,8 @@ use bridge::Platform;
 use glove::scan::{Config, Scanner};
 use glove::{Duration, Instant};
 
+use super::shared::{Scanned, Shared};
 use super::snapshot::Here;
-use super::{Scanned, Shared};
 use crate::clock::{Clock, since};
 use crate::interrupt::Interrupt;
 use crate::lines::Pc;

@@ -8,20 +8,10 @@ use bridge::protocol;
 use glove::calibration::Bound;
 
 use super::calibrating::told;
-use super::chip_worker::Worker;
+use super::chip_worker::{Trying, Worker};
 use super::hub::Happened;
 use super::record::Sort;
 use crate::chip::link::{Error, HostLink};
-
-/// A calibration that is tried as often as it takes.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Trying {
-    until: Instant,
-    /// Sensors that sit straight; else the headings by the profile.
-    is_straight: bool,
-    /// Tries that had ended when the newest began.
-    ended: u16,
-}
 
 impl Worker {
     pub(super) fn begin_try(

@@ -11,7 +11,6 @@ use bridge::protocol;
 use bridge::protocol::message::{Counters, Sample, Status};
 
 use super::axes::Axes;
-use super::chip_calibrating::Trying;
 use super::chip_devices::Told;
 use super::chip_stop::{Known, renew, stop};
 use super::hub::Hub;
@@ -37,6 +36,16 @@ const MISSED_STATUSES: u32 = 3;
 const MISSED_BEATS: u32 = 20;
 /// Frames between two looks at the counters that say something of the glove.
 const LEAST_FRAMES: u32 = 5;
+
+/// A calibration that is tried as often as it takes.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Trying {
+    pub(super) until: Instant,
+    /// Sensors that sit straight; else the headings by the profile.
+    pub(super) is_straight: bool,
+    /// Tries that had ended when the newest began.
+    pub(super) ended: u16,
+}
 
 /// What a conversation leaves.
 #[derive(Debug)]

@@ -1,8 +1,8 @@
 //! Every key of the settings file.
 
-use super::Value;
+use super::value::Value;
 use crate::lines::Model;
-use crate::next::{NextStep, advice};
+use crate::next::{Command, NextStep, advice};
 
 /// The file's sections, in its order.
 pub const SECTIONS: [&str; 4] = ["glove", "gripper", "teleop", "keys"];
@@ -230,7 +230,7 @@ pub(super) fn outside(name: &str) -> NextStep {
     let under = KEYS.iter().find(|key| key.within() == name);
     match under {
         Some(key) => advice(format!("the same line below [{}]", key.section())),
-        None => super::known(nearest(name, KEYS.iter().map(|key| key.name)).map(str::to_owned)),
+        None => known(nearest(name, KEYS.iter().map(|key| key.name)).map(str::to_owned)),
     }
 }
 
@@ -262,4 +262,12 @@ fn differ(a: &str, b: &str) -> usize {
         }
     }
     row.last().copied().unwrap_or_default()
+}
+
+pub(super) fn known(nearest: Option<String>) -> NextStep {
+    let all = Command::gauntlet("settings").then(" prints every key with its default");
+    match nearest {
+        Some(nearest) => advice(format!("{nearest}, if that is meant; ")).then(all),
+        None => all,
+    }
 }

@@ -291,11 +291,7 @@ fn worn(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 3]> {
         let now = machine.now();
         if let Some(frame) = scanner.poll(now) {
             if frames == 0 {
-                let profile = glove::calibration::Bound {
-                    profile: glove::calibration::Profile::straight(glove::hand::Side::Right),
-                    ids: scanner.ids().map(Option::unwrap_or_default),
-                };
-                posture.set_profile(Some(&profile));
+                posture.set_profile(Some(&profile(scanner.ids())));
                 posture.meet(&scanner.ids());
                 posture.hear(&scanner.counters().starts, true, now);
                 posture.begin_pose();
@@ -317,4 +313,21 @@ fn worn(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 3]> {
     mean.times = most.times;
     mean.instructions = sum.checked_div(u64::from(most.times))? as u32;
     Some([mean, most, pose])
+}
+
+/// Of the trace's sensors, whose hand lies flat with its back to the side: they say that it is up.
+fn profile(
+    ids: [Option<glove::imu::UniqueId>; glove::hand::SEGMENT_COUNT],
+) -> glove::calibration::Bound {
+    let side = glove::hand::Side::Right;
+    let mut bent = [0.0; glove::hand::JOINT_COUNT];
+    // The index finger's base, segment 4.
+    bent[5] = -core::f32::consts::FRAC_PI_2;
+    let quarter = glove::hand::segment_orientations(&bent, side)[4];
+    let mut profile = glove::calibration::Profile::straight(side);
+    profile.mounting = [quarter; glove::hand::SEGMENT_COUNT];
+    glove::calibration::Bound {
+        profile,
+        ids: ids.map(Option::unwrap_or_default),
+    }
 }

@@ -6,7 +6,7 @@ use anyhow::Result;
 use glove::calibration::{Bound, Step};
 use glove::headings::NotFlat;
 
-use super::Calibrate;
+use super::args::Calibrate;
 use super::source::{Place, Source};
 use crate::commands::bridge::flat_pose;
 use crate::results::{self, calibrations};
@@ -61,7 +61,7 @@ pub(super) fn run(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt)
     };
     if !options.json && findings.is_empty() {
         tell.say(format_args!(
-            "flat       every sensor lies as it was calibrated"
+            "flat       no sensor is tilted against its calibration; one turned about the vertical cannot be seen so"
         ));
     }
     let judged = judged.and_then(|()| match (place, link) {

@@ -1,27 +1,26 @@
 //! `gauntlet calibrate`: a glove gets to know a hand, and a file remembers it.
 
+mod args;
 mod flat;
 mod list;
 pub(in crate::commands) mod session;
 pub(in crate::commands) mod source;
+mod verdict;
 
 use std::path::Path;
-use std::path::PathBuf;
 use std::time::SystemTime;
 
 use anyhow::Result;
-use clap::Args;
 use glove::calibration::{Bound, Misfit, Verdict};
-use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES, Side};
+use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::UniqueId;
 
 use crate::commands::bridge::flat_pose;
-use crate::commands::glove::GloveAt;
-use crate::commands::teleop::Hand as WhichHand;
 use crate::outputs::{self, Kind};
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
 use crate::wearer::Listener;
+pub use args::Calibrate;
 use host::calibration::guide::Finding;
 use host::calibration::{Judged, ProfileStore};
 use host::chip::link::{Address, Error, HostLink};
@@ -32,55 +31,7 @@ use host::next::{Command, NextStep, advice};
 use host::session::Devices;
 use session::{Leading, Led, Session};
 use source::{Place, give_by_hand};
-
-/// Options of `calibrate`.
-#[derive(Debug, Args)]
-#[command(after_help = "\
-Examples:
-  gauntlet calibrate --glove /dev/ttyUSB0                 the guided session, a minute
-  gauntlet calibrate --glove /dev/ttyUSB0 --hand left     … and the glove must turn out to be a left one
-  gauntlet calibrate --glove /dev/ttyUSB0 --flat          next day: does the profile still fit?
-  gauntlet calibrate --bridge /dev/ttyACM0                the glove of a bridge on a chip, which keeps the profile
-  gauntlet calibrate --list                               the profiles that are there
-
-Wear the glove and sit at a table. The hand lies flat, turns, lies flat, bends one finger after the other, makes fists, \
-moves the thumb, moves freely and lies flat once more: each is asked for in words and drawn, and what is not seen is asked again. \
-Keys: space begins, r does a step again, q ends. Without a terminal it begins by itself. \
-The profile goes into a file bound to the sensors' unique ids, where `teleop` finds it. \
-It is written when every check holds or leaves doubts; what is bad is not, but with --keep-anyway. \
-A virtual glove's person does what is asked by itself (`gauntlet simulate`). Exit code 1 where nothing is kept.")]
-pub struct Calibrate {
-    /// The glove's serial port; needed but for --bridge and --list.
-    #[arg(long, value_name = "PORT")]
-    pub glove: Option<PathBuf>,
-    /// The glove of the bridge on a chip there: a serial port, unix:PATH or tcp:HOST:PORT. The bridge keeps the profile, too.
-    #[arg(long, value_name = "PORT", conflicts_with_all = ["glove", "list", "profile"])]
-    pub bridge: Option<Address>,
-    /// Which hand should wear it; a glove that turns out to be on the other one is refused.
-    #[arg(long, value_enum)]
-    pub hand: Option<WhichHand>,
-    /// Write the profile into this file instead of among the others.
-    #[arg(long, value_name = "FILE.toml", conflicts_with = "list")]
-    pub out: Option<PathBuf>,
-    /// Take sensors that sit elsewhere than they are wired as they sit.
-    #[arg(long, conflicts_with = "list")]
-    pub as_they_sit: bool,
-    /// Keep the profile although a check says that it is bad.
-    #[arg(long, conflicts_with = "list")]
-    pub keep_anyway: bool,
-    /// One flat pose of 2 s with the profile there is: whether a sensor has slipped since.
-    #[arg(long, conflicts_with_all = ["list", "out", "as_they_sit", "keep_anyway"])]
-    pub flat: bool,
-    /// The profile for --flat, instead of the one that the glove's ids find.
-    #[arg(long, value_name = "FILE.toml", requires = "flat")]
-    pub profile: Option<PathBuf>,
-    /// List the profiles that are there; no glove is needed.
-    #[arg(long)]
-    pub list: bool,
-    /// Print the result as JSON on standard output, and nothing else there.
-    #[arg(long)]
-    pub json: bool,
-}
+use verdict::lines;
 
 /// Calibrates, looks whether a calibration still fits, or lists.
 ///
@@ -104,26 +55,6 @@ pub(crate) fn run(options: &Calibrate, interrupt: &Interrupt) -> Result<()> {
     match options.flat {
         true => flat::run(options, &place, interrupt),
         false => guided(options, &place, interrupt),
-    }
-}
-
-impl Calibrate {
-    /// The glove at a port, as other verbs know it.
-    fn at(&self, glove: &Path) -> GloveAt {
-        GloveAt {
-            glove: glove.to_owned(),
-            profile: self.profile.clone(),
-            ideal: false,
-            hand: self.hand.unwrap_or(WhichHand::Right),
-            json: self.json,
-        }
-    }
-
-    fn declared(&self) -> Option<Side> {
-        self.hand.map(|hand| match hand {
-            WhichHand::Right => Side::Right,
-            WhichHand::Left => Side::Left,
-        })
     }
 }
 
@@ -314,41 +245,6 @@ fn decide(options: &Calibrate, judged: &Judged, agreed: bool) -> Result<()> {
         return Err(Failure::new(what, next).into());
     }
     Ok(())
-}
-
-/// What it came to, for a person.
-fn lines(judged: &Judged) -> Vec<String> {
-    let findings = judged.findings();
-    let hand = match judged.outcome.profile.side {
-        Side::Right => "right",
-        Side::Left => "left",
-    };
-    let quality = judged.quality();
-    let verdict = match judged.verdict() {
-        Verdict::Good => "good: every check holds",
-        Verdict::Doubtful => "usable, with doubts",
-        Verdict::Bad => "not good enough to be used",
-    };
-    let joints = judged.joints();
-    let good = joints
-        .iter()
-        .filter(|joint| joint.verdict == "good")
-        .count();
-    let mut lines = vec![
-        format!(
-            "verdict    {verdict}; {good} of {} joints good, a {hand} hand",
-            joints.len()
-        ),
-        format!(
-            "checks     moved in the turn {:.1}° (6° at most), ambiguity {:.2} (0.80), last flat pose tilted {:.1}° (9°), turned {:.1}° (4°)",
-            quality.fit_deg, quality.ratio, quality.tilt_deg, quality.heading_deg
-        ),
-    ];
-    for finding in findings {
-        lines.push(format!("{:<10} {}", finding.verdict, finding.what));
-        lines.push(format!("  try: {}", finding.todo));
-    }
-    lines
 }
 
 fn swapped(findings: &[Finding]) -> Vec<String> {

@@ -274,7 +274,7 @@ impl Session {
             .map_or("the last flat pose", |again| again.words());
         keys.push(format!("r: {again} again"));
         keys.push("q: end without keeping it".to_owned());
-        (super::lines(judged), !bad, keys.join("   "))
+        (super::verdict::lines(judged), !bad, keys.join("   "))
     }
 
     /// Ends the reading.

@@ -4,17 +4,15 @@ mod at;
 mod flat;
 mod watch;
 
-use std::time::Duration;
-
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use crate::options::run_time;
 use host::interrupt::Interrupt;
 
 pub use at::GloveAt;
 pub(in crate::commands) use at::Opened;
 pub(in crate::commands) use flat::take_flat;
+pub use watch::Watch;
 
 /// Options of `glove`.
 #[derive(Debug, Args)]
@@ -36,17 +34,6 @@ pub struct Glove {
 pub enum Verb {
     /// Show the hand, the rates and each sensor until the time is over or Ctrl-C.
     Watch(Watch),
-}
-
-/// Options of `glove watch`.
-#[derive(Debug, Args)]
-pub struct Watch {
-    /// The glove.
-    #[command(flatten)]
-    pub at: GloveAt,
-    /// End by itself after this many seconds (1 to 86400).
-    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
-    pub seconds: Option<Duration>,
 }
 
 impl Glove {

@@ -4,13 +4,15 @@ use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
+use clap::Args;
 use glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_NAMES};
 use glove::imu;
 use glove::scan::{Health, State};
 
-use super::Watch;
+use super::at::GloveAt;
 use crate::live::glove::{GloveView, Sensor};
 use crate::live::{Bindings, Finger, Key, Live};
+use crate::options::run_time;
 use crate::results::{self, gloves};
 use crate::run::FLAT_WAIT;
 use crate::say;
@@ -22,6 +24,17 @@ use host::interrupt::Interrupt;
 use host::scanning::{self, Flat, Hand, Pose, Scanning, Snapshot};
 use host::stats::{short, short_or_dash};
 use host::words;
+
+/// Options of `glove watch`.
+#[derive(Debug, Args)]
+pub struct Watch {
+    /// The glove.
+    #[command(flatten)]
+    pub at: GloveAt,
+    /// End by itself after this many seconds (1 to 86400).
+    #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
+    pub seconds: Option<Duration>,
+}
 
 /// Pause between two rounds.
 const ROUND: Duration = Duration::from_millis(20);

@@ -8,7 +8,7 @@ use glove::{Duration, Instant};
 
 use super::Remark;
 use super::judged::Finding;
-use super::judging::{FLAT_SCANS, STILL};
+use super::limits::{FLAT_SCANS, STILL};
 use super::watch::Watch;
 use crate::calibration::report::word;
 use crate::clock::since;

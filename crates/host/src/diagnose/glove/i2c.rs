@@ -1,24 +1,17 @@
 //! A glove on an I²C port of this computer: port, multiplexer, sensors.
 
-use std::time::Duration;
-
-use glove::bus::{Batch, Bus, Error, Reply, Transaction};
+use glove::bus::{Batch, Error, Transaction};
 use glove::mux;
 use glove::scan::{BusScanner, Config};
 
 use super::bridge_chip::MULTIPLEXERS;
+use super::exchange::exchange;
 use super::sensors;
-use crate::clock::Clock;
 use crate::diagnose::Findings;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::lines::i2c::{self, Address, Port};
 use crate::next::{Command, NextStep, advice};
-
-/// Pause between two looks.
-const LOOK: Duration = Duration::from_millis(1);
-/// Looks for one answer: longer than the port's own deadline.
-const LOOKS: u32 = 200;
 
 const HUNG_NEXT: &str = "a short on SDA or SCL, or a chip that holds them: switch the glove off and on; then unplug the multiplexer and \
                          look again";
@@ -110,29 +103,6 @@ fn ask(port: &mut Port, address: u8, interrupt: &Interrupt) -> Result<(), Error>
     let batch = Transaction::read(address, 1)
         .and_then(|read| Batch::from_slice(&[read]).map_err(|_| Error::Unsupported))?;
     exchange(port, &batch, interrupt).map(drop)
-}
-
-/// Makes a batch and waits for its end.
-pub(super) fn exchange(
-    bus: &mut impl Bus,
-    batch: &Batch,
-    interrupt: &Interrupt,
-) -> Result<Reply, Error> {
-    let clock = Clock::start();
-    let mut begun = false;
-    for _ in 0..LOOKS {
-        if !begun && bus.is_up() {
-            bus.start(batch, clock.now())?;
-            begun = true;
-        }
-        if let Some(result) = bus.poll(clock.now()).filter(|_| begun) {
-            return result;
-        }
-        if interrupt.sleep(LOOK) {
-            break;
-        }
-    }
-    Err(Error::NoAnswer)
 }
 
 /// The layer, what is wrong, and what to try.

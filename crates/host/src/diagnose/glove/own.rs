@@ -5,7 +5,7 @@ use glove::hand::{Quaternion, SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::{self, Mode, UniqueId, register};
 use glove::scan::Frame;
 
-use super::i2c::exchange;
+use super::exchange::exchange;
 use crate::clock::since;
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;

@@ -153,7 +153,7 @@ pub(super) fn classify(path: &Path, baud: u32, error: &serialport::Error) -> Ope
 }
 
 /// Name of the group that owns `path`; "dialout", the usual one, where it cannot be found out.
-pub(in crate::lines) fn group_of(path: &Path) -> String {
+pub(crate) fn group_of(path: &Path) -> String {
     let found = std::fs::metadata(path).ok().and_then(|metadata| {
         let groups = std::fs::read_to_string("/etc/group").ok()?;
         let id = metadata.gid().to_string();
