@@ -88,7 +88,7 @@ fn fits(kept: &Kept, seed: u64, glove: &VirtualGlove) -> Result<()> {
     let what = format!("the profile is not of the glove of seed {seed}: {misfit}");
     let next = Command::gauntlet("demo")
         .option("--seed", seed.to_string())
-        .then(" without --profile calibrates it, or the seed of `simulate` that wrote the profile");
+        .then(" without --profile calibrates it, or the seed of the simulation that wrote the profile");
     Err(Failure::new(what, next).into())
 }
 
