@@ -7,9 +7,6 @@ use std::time::Duration;
 use bridge::clutch::Position;
 use bridge::{HoldReason, State};
 
-/// So long the clutch stays closed without a heartbeat.
-const HEARTBEAT_LEASE: Duration =
-    Duration::from_micros(bridge::timing::HEARTBEAT_TIMEOUT.as_ticks());
 /// Held for so long before it first follows is no fault: frames in a row, a gripper that is looked at.
 const BRING_UP: Duration = Duration::from_secs(2);
 
@@ -40,16 +37,10 @@ pub struct Driven {
 }
 
 impl Driven {
-    /// `time` passed between two moments. A program that stands still sees in the second what the bridge made of that time; where
-    /// that is following again, the bridge had no heartbeat for what is beyond the clutch's 250 ms and held.
+    /// `time` passed between two moments. A program that stands still sees in the second what the bridge made of that time.
     pub fn pass(&mut self, time: Duration, before: Moment, now: Moment) {
         if now.state.is_moving() {
-            let unseen = time.saturating_sub(HEARTBEAT_LEASE);
-            self.moving += time - unseen;
-            if before.state.is_moving() && !unseen.is_zero() {
-                self.held += unseen;
-                self.held_for(HoldReason::HeartbeatLost, unseen);
-            }
+            self.moving += time;
             return;
         }
         let open = before.clutch == Position::Open || now.state == State::Idle;
@@ -61,10 +52,6 @@ impl Driven {
         let Some(reason) = now.state.hold_reason().filter(|_| closed) else {
             return;
         };
-        self.held_for(reason, time);
-    }
-
-    fn held_for(&mut self, reason: HoldReason, time: Duration) {
         let same = |(known, _): &&mut (HoldReason, _)| discriminant(known) == discriminant(&reason);
         match self.reasons.iter_mut().find(same) {
             Some(known) => *known = (reason, known.1 + time),
@@ -115,16 +102,6 @@ mod tests {
         Moment { clutch, state }
     }
 
-    /// `time` with a look each 100 ms.
-    fn pass(driven: &mut Driven, time: Duration, before: Moment, now: Moment) {
-        let look = Duration::from_millis(100);
-        let mut before = before;
-        for _ in 0..time.as_millis() / look.as_millis() {
-            driven.pass(look, before, now);
-            before = now;
-        }
-    }
-
     fn held(reason: HoldReason) -> Moment {
         moment(Position::Closed, State::Holding(reason))
     }
@@ -141,10 +118,10 @@ mod tests {
             following,
         ];
         for now in steps {
-            pass(&mut driven, SECOND, following, now);
+            driven.pass(SECOND, following, now);
         }
         assert_eq!(driven.mostly_held(), Some(HoldReason::SensorsLost(3)));
-        pass(&mut driven, SECOND, following, following);
+        driven.pass(SECOND, following, following);
         assert_eq!(
             driven.mostly_held(),
             None,
@@ -157,7 +134,7 @@ mod tests {
         let mut driven = Driven::default();
         let following = moment(Position::Closed, State::Following);
         let expired = moment(Position::Expired, State::Holding(HoldReason::HeartbeatLost));
-        pass(&mut driven, SECOND, following, following);
+        driven.pass(SECOND, following, following);
         driven.pass(2 * SECOND, following, expired);
         assert_eq!(driven.held(), 2 * SECOND);
         // Until a person acts; what it should have done then nobody says.
@@ -168,18 +145,5 @@ mod tests {
         driven.pass(SECOND, expired, open);
         driven.pass(SECOND, open, open);
         assert_eq!(driven.held(), 3 * SECOND);
-    }
-
-    #[test]
-    fn a_stop_of_less_than_a_second_after_which_it_follows_again_was_held_but_for_the_first_quarter()
-     {
-        let mut driven = Driven::default();
-        let following = moment(Position::Closed, State::Following);
-        let tenth = Duration::from_millis(100);
-        driven.pass(tenth, following, following);
-        driven.pass(9 * tenth, following, following);
-        assert_eq!(driven.moving(), Duration::from_millis(350));
-        assert_eq!(driven.held(), Duration::from_millis(650));
-        assert_eq!(driven.reason(), Some(HoldReason::HeartbeatLost));
     }
 }
