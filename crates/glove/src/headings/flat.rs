@@ -109,7 +109,7 @@ impl Pose {
             return None;
         }
         let cos = self.up[k] / f32::from(n);
-        Some(libm::acosf(cos.clamp(-1.0, 1.0)))
+        Some(libm::acosf(if cos < 1.0 { cos } else { 1.0 }))
     }
 }
 
