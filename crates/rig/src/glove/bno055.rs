@@ -5,8 +5,11 @@
 //! output. What is not: raw magnetometer, Euler angles (they read zero), interrupts, units other
 //! than the data sheet's first ones.
 
+mod motion;
+
 use crate::chance::Chance;
 use crate::{Duration, Instant};
+use motion::{gravity_in_sensor, turn_rate};
 
 /// A reset or power-on takes this long; every access gets a NACK meanwhile.
 pub const BOOT: Duration = Duration::from_millis(650);
@@ -432,27 +435,4 @@ fn addresses_from(first: u8) -> impl Iterator<Item = u8> {
 fn unique_id_byte(index: usize, i: usize) -> u8 {
     let mixed = (index * 29 + 7) * (i * 13 + 5);
     (mixed % 251) as u8
-}
-
-/// Body rates in rad/s from two orientations one fusion period apart.
-fn turn_rate(before: [f32; 4], after: [f32; 4]) -> [f32; 3] {
-    let [w, x, y, z] = before;
-    let [bw, bx, by, bz] = after;
-    let turn = [
-        w * bx - x * bw - y * bz + z * by,
-        w * by + x * bz - y * bw - z * bx,
-        w * bz - x * by + y * bx - z * bw,
-    ];
-    let cosine = w * bw + x * bx + y * by + z * bz;
-    let seconds = FUSION_PERIOD.as_ticks() as f32 * 1e-6;
-    turn.map(|c| 2.0 * c * cosine.signum() / seconds)
-}
-
-/// World z (up, where the reaction to gravity points) seen by the sensor, unit length.
-fn gravity_in_sensor([w, x, y, z]: [f32; 4]) -> [f32; 3] {
-    [
-        2.0 * (x * z - w * y),
-        2.0 * (y * z + w * x),
-        1.0 - 2.0 * (x * x + y * y),
-    ]
 }
