@@ -25,6 +25,7 @@ use host::interrupt::Interrupt;
 use host::recording::{QUEUE, SessionLog};
 use host::session::record::{self, Feed, Records, Sort};
 use host::session::{Devices, Driver, Ending, Order, Session, Snapshot};
+use host::settings::Settings;
 use shown::Shown;
 
 pub use bringup::{ASK as ASK_FLAT, WAIT as FLAT_WAIT};
@@ -241,6 +242,8 @@ impl Run {
     }
 
     fn watch(&mut self, options: &Options) -> Result<End> {
+        // A key that was bound to something safe must not close the clutch since the file could not be read.
+        Settings::load()?;
         let terminal = || "the terminal does not work".to_owned();
         let next = "the same with | cat behind it, which prints lines instead";
         let mut live = Live::start(options.quiet).or_fail(terminal, next)?;

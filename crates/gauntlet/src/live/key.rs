@@ -38,7 +38,8 @@ impl Default for Bindings {
 }
 
 impl Bindings {
-    /// Those that this person prefers, read once. A settings file that is wrong was refused before anything began.
+    /// Those that this person prefers, read once. A settings file that is wrong was refused before anything began: by the command line, or
+    /// before a run is watched.
     pub fn load() -> Self {
         static LOADED: OnceLock<Bindings> = OnceLock::new();
         *LOADED.get_or_init(|| Self::of(&Settings::load().unwrap_or_default()))

@@ -14,6 +14,7 @@ use crate::options::run_time;
 use crate::outputs;
 use crate::results::{self, gloves, runs};
 use crate::tell::Tell;
+use host::calibration::virtual_person::VirtualPerson;
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -219,10 +220,16 @@ fn complete(options: &Record, missing: usize) -> Result<()> {
 
 fn not_calibrated(options: &Record, why: &str) -> Failure {
     let place = options.at.glove.display();
-    let next = Command::gauntlet("calibrate")
+    let calibrate = Command::gauntlet("calibrate")
         .path("--glove", &options.at.glove)
-        .then(", and then the same again; for a virtual glove whose sensors sit straight ")
-        .then(NextStep::same(Command::more().word("--ideal")));
+        .then(", and then the same again");
+    // Never for a real glove: its angles would be wrong by tens of degrees.
+    let next = match VirtualPerson::at(&options.at.glove) {
+        Some(_) => calibrate
+            .then("; if its sensors sit straight: ")
+            .then(NextStep::same(Command::more().word("--ideal"))),
+        None => calibrate,
+    };
     Failure::new(
         format!("the glove on {place} is not calibrated: {why}"),
         next,

@@ -12,6 +12,7 @@ use super::args::Teleop;
 use crate::run::Run;
 use crate::tell::Tell;
 use host::calibration::profile_of;
+use host::calibration::virtual_person::VirtualPerson;
 use host::diagnose;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -119,10 +120,14 @@ fn find_profile(options: &Teleop, run: &mut Run, tell: &Tell) -> Result<()> {
     run.wears(None);
     let place = options.glove.display();
     let what = format!("the glove on {place} is not calibrated, and moves nothing: {why}");
-    let next = Command::gauntlet("calibrate")
-        .path("--glove", &options.glove)
-        .then("; a virtual glove whose sensors sit straight: ")
-        .then(NextStep::same(Command::more().word("--ideal")));
+    let calibrate = Command::gauntlet("calibrate").path("--glove", &options.glove);
+    // Never for a real glove: its angles would be wrong by tens of degrees.
+    let next = match VirtualPerson::at(&options.glove) {
+        Some(_) => calibrate
+            .then("; if its sensors sit straight: ")
+            .then(NextStep::same(Command::more().word("--ideal"))),
+        None => calibrate.into(),
+    };
     if options.calibrate_flat || options.profile.is_some() {
         return Err(Failure::new(what, next).into());
     }
