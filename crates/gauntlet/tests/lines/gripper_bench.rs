@@ -480,16 +480,16 @@ fn watch_names_the_layer_that_fails_on_the_network_as_words_and_as_json() {
         let gripper = VirtualGripper::new(Config::default());
         let server = tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();
         let place = format!("tcp:{}", server.address());
-        let mut child = start(&[&["gripper", "watch", "--gripper", &place], more].concat());
-        let said = support::until_line(child.stdout.take().unwrap(), "not activated");
+        let words = [&["gripper", "watch", "--gripper", &place], more].concat();
+        let (mut child, said, _) = support::told::started(&words);
+        let before = said.until(0, "not activated");
         drop(server);
-        std::thread::sleep(Duration::from_millis(1_500));
+        let network = ["closed the connection", "refused", "not connected"];
+        said.until_one_of(before, &network);
         interrupt(&child);
         assert_eq!(support::wait(&mut child).code(), Some(0));
-        let said = said.join().unwrap();
+        let said = said.all();
         assert!(!said.contains("serial port"), "{said}");
-        let network = ["closed the connection", "refused", "not connected"];
-        assert!(network.iter().any(|words| said.contains(words)), "{said}");
         if more == ["--json"] {
             let lines = said.lines().map(serde_json::from_str::<serde_json::Value>);
             let errors: Vec<_> = lines

@@ -207,7 +207,11 @@ fn ctrl_c_ends_the_search_and_claims_nothing() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(std::time::Duration::from_millis(2_500));
+    let end = std::time::Instant::now() + std::time::Duration::from_secs(60);
+    while gripper.requests().0 < 2 {
+        assert!(std::time::Instant::now() < end, "the search did not begin");
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
     interrupt(&child);
     let output = finish(child);
     let said = text(&output.stdout);

@@ -110,7 +110,11 @@ fn ctrl_c_ends_the_reading_of_a_table() {
     // Whoever writes it never comes to its end.
     let mut writer = std::fs::File::options().write(true).open(&poses).unwrap();
     writer.write_all(poses_text(50).as_bytes()).unwrap();
-    std::thread::sleep(Duration::from_millis(500));
+    let end = Instant::now() + BRINGUP;
+    while rustix::io::ioctl_fionread(&writer).unwrap() > 0 {
+        assert!(Instant::now() < end, "the table is not read");
+        std::thread::sleep(Duration::from_millis(5));
+    }
     interrupt(&running.0);
     assert_eq!(ends_soon(&mut running.0), Some(1));
     let error = refusal(&running.finish(), 1);
@@ -146,7 +150,8 @@ fn ctrl_c_at_the_terminal_does_not_reach_the_emulator_and_ends_the_wait_for_it()
     );
     let child = &mut running.0;
     let said = || std::fs::read_to_string(&says).unwrap_or_default();
-    let end = Instant::now() + 2 * BRINGUP;
+    // It trains a map first, in what time other tests leave.
+    let end = Instant::now() + Duration::from_secs(500);
     while !said().contains("started") {
         assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
         assert!(Instant::now() < end, "the emulator was not started");

@@ -2,6 +2,7 @@
 
 use crate::support;
 
+use support::told::started;
 use support::{
     Simulation, finish, interrupt, json, model, refusal, run, start, text, until_line, wait,
 };
@@ -119,15 +120,13 @@ fn ctrl_c_holds_a_gripper_on_the_network() {
 fn a_gripper_that_leaves_the_network_while_it_is_driven_is_told() {
     let simulation = Simulation::with(true, Some("tcp:127.0.0.1:0"), &["--ideal"]);
     let arguments = teleop(&simulation, &[]);
-    let mut child = start(&words(&arguments));
-    let said = until_line(child.stdout.take().unwrap(), "following");
+    let (mut child, said, errors) = started(&words(&arguments));
+    let before = said.until(0, "following");
     drop(simulation);
-    std::thread::sleep(std::time::Duration::from_millis(300));
+    said.until(before, "unplugged");
     interrupt(&child);
-    let errors = child.stderr.take().unwrap();
     let code = wait(&mut child).code();
-    let said = said.join().unwrap();
-    let stderr = std::io::read_to_string(errors).unwrap();
+    let (said, stderr) = (said.all(), errors.all());
     assert_eq!(code, Some(1), "{said} {stderr}");
     assert!(stderr.contains("not confirmed"), "{stderr}");
     assert!(!said.contains("is held"), "{said}");

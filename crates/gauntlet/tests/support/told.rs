@@ -36,14 +36,20 @@ impl Told {
 
     /// Waits until what was said after the first `from` bytes holds `word`; how much was said then.
     pub fn until(&self, from: usize, word: &str) -> usize {
+        self.until_one_of(from, &[word])
+    }
+
+    /// The same for any of some words.
+    pub fn until_one_of(&self, from: usize, words: &[&str]) -> usize {
         let end = Instant::now() + DEADLINE;
         loop {
             let said = self.so_far();
-            if said.get(from..).is_some_and(|said| said.contains(word)) {
+            let new = said.get(from..).unwrap_or_default();
+            if words.iter().any(|word| new.contains(word)) {
                 return said.len();
             }
             let over = self.reader.is_finished() || Instant::now() > end;
-            assert!(!over, "never said {word}: {said}");
+            assert!(!over, "never said {words:?}: {said}");
             std::thread::sleep(Duration::from_millis(1));
         }
     }

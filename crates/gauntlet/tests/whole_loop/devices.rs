@@ -2,13 +2,11 @@
 
 use crate::support;
 
-use std::io::Read;
-use std::process::{Child, Stdio};
-use std::thread::JoinHandle;
+use std::process::Child;
 use std::time::Duration;
-use support::{
-    Simulation, command, interrupt, json, refusal, run_owned, teleop, text, until_line, wait,
-};
+
+use support::told::{Told, started};
+use support::{Simulation, interrupt, json, refusal, run_owned, teleop, text, wait};
 
 #[test]
 fn teleop_drives_the_simulated_gripper_and_logs_it() {
@@ -72,48 +70,30 @@ fn engaging_a_gripper_that_is_not_activated_is_refused_with_the_way_out() {
 }
 
 /// Starts `teleop --engage --activate` and waits until it has said `word`.
-fn driving(simulation: &Simulation, word: &str, log: &str) -> (Child, JoinHandle<String>) {
-    let arguments = teleop(
-        &simulation.glove(),
-        &simulation.gripper(),
-        &[
-            "--ideal",
-            "--calibrate-flat",
-            "--engage",
-            "--activate",
-            "--log",
-            log,
-        ],
-    );
-    let mut child = command(&arguments.iter().map(String::as_str).collect::<Vec<_>>())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let said = until_line(child.stdout.take().unwrap(), word);
-    (child, said)
+/// It said `word`; and what it said until then, its standard output and its errors.
+fn driving(simulation: &Simulation, word: &str, log: &str) -> (Child, usize, [Told; 2]) {
+    let (glove, gripper) = (simulation.glove(), simulation.gripper());
+    let more = ["--ideal", "--calibrate-flat", "--engage", "--activate"];
+    let arguments = teleop(&glove, &gripper, &[&more[..], &["--log", log]].concat());
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let (child, said, errors) = started(&words);
+    let until = said.until(0, word);
+    (child, until, [said, errors])
 }
 
-fn ended(mut child: Child) -> (Option<i32>, String) {
+/// Its exit code and all that it said.
+fn ended(mut child: Child, [said, errors]: [Told; 2]) -> (Option<i32>, String, String) {
     let code = wait(&mut child).code();
-    let mut stderr = String::new();
-    child
-        .stderr
-        .take()
-        .unwrap()
-        .read_to_string(&mut stderr)
-        .unwrap();
-    (code, stderr)
+    (code, said.all(), errors.all())
 }
 
 #[test]
 fn ctrl_c_while_driving_holds_and_finishes_the_log() {
     let mut simulation = Simulation::start(true, true);
     let log = simulation.folder.path().join("run.mcap");
-    let (child, said) = driving(&simulation, "following", log.to_str().unwrap());
+    let (child, _, told) = driving(&simulation, "following", log.to_str().unwrap());
     interrupt(&child);
-    let (code, stderr) = ended(child);
-    let said = said.join().unwrap();
+    let (code, said, stderr) = ended(child, told);
     assert_eq!(code, Some(0), "{said} {stderr}");
     assert!(said.contains("the gripper is held where it is"), "{said}");
     let bytes = std::fs::read(&log).unwrap();
@@ -135,17 +115,16 @@ fn ctrl_c_while_driving_holds_and_finishes_the_log() {
 fn a_hold_that_the_gripper_does_not_confirm_is_told_as_a_failure() {
     let mut simulation = Simulation::start(true, true);
     let log = simulation.folder.path().join("run.mcap");
-    let (child, said) = driving(&simulation, "following", log.to_str().unwrap());
+    let (child, before, told) = driving(&simulation, "following", log.to_str().unwrap());
     // Both devices are gone at once, as when a power strip is switched off. The links go first: their terminals' numbers are
     // given out again, and the tool would open another test's.
     for device in ["glove", "gripper"] {
         std::fs::remove_file(simulation.folder.path().join(device)).unwrap();
     }
     simulation.child.kill().unwrap();
-    std::thread::sleep(Duration::from_millis(300));
+    told[0].until(before, "unplugged");
     interrupt(&child);
-    let (code, stderr) = ended(child);
-    let said = said.join().unwrap();
+    let (code, said, stderr) = ended(child, told);
     assert_eq!(code, Some(1), "{said} {stderr}");
     assert!(stderr.contains("not confirmed"), "{stderr}");
     assert!(!said.contains("is held"), "{said}");
@@ -155,12 +134,11 @@ fn a_hold_that_the_gripper_does_not_confirm_is_told_as_a_failure() {
 fn ctrl_c_during_activation_does_not_claim_a_hold() {
     let mut simulation = Simulation::start(true, true);
     let log = simulation.folder.path().join("run.mcap");
-    let (child, said) = driving(&simulation, "activating the gripper", log.to_str().unwrap());
+    let (child, _, told) = driving(&simulation, "activating the gripper", log.to_str().unwrap());
     // It says so before it tells the gripper, and an end that comes before that leaves the gripper alone.
     std::thread::sleep(Duration::from_millis(150));
     interrupt(&child);
-    let (code, stderr) = ended(child);
-    let said = said.join().unwrap();
+    let (code, said, stderr) = ended(child, told);
     assert_eq!(code, Some(1), "{said} {stderr}");
     assert!(stderr.contains("activating and cannot be held"), "{stderr}");
     assert!(!said.contains("is held"), "{said}");

@@ -6,6 +6,7 @@ use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use support::bench::{BRINGUP, Bench, Running, jam, jumps};
+use support::told::interrupted_at;
 use support::{command, interrupt, refusal, run, text};
 
 #[test]
@@ -178,14 +179,8 @@ fn ctrl_c_before_driving_began_has_failed_and_says_what_was_written() {
     let mut bench = Bench::new(&["--engage"]);
     // It is never calibrated.
     bench.hand_moves();
-    let running = Running::start(
-        command(&bench.arguments())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped()),
-    );
-    std::thread::sleep(Duration::from_secs(6));
-    interrupt(&running.0);
-    let error = refusal(&running.finish(), 1);
+    let (output, _) = interrupted_at("lay the hand flat", &bench.arguments());
+    let error = refusal(&output, 1);
     assert!(error.contains("interrupted"), "{error}");
     assert!(
         error.contains("nothing was written to the gripper") || error.contains("nothing was moved"),
