@@ -29,7 +29,7 @@ pub struct ProfileState {
 pub enum Lack {
     /// A profile.
     Profile,
-    /// A profile of its own: the one there is another glove's, or no sensor has answered yet.
+    /// A profile of its own: the one there is another glove's, or its sensors have not told yet that it is this one's.
     OwnProfile,
     /// A flat pose.
     FlatPose,
@@ -52,8 +52,8 @@ impl core::fmt::Display for Lack {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         f.write_str(match self {
             Self::Profile => "there is no profile of this glove: calibrating it makes one",
-            Self::OwnProfile => "the profile is of another glove, or no sensor answers: calibrating it makes one of this glove",
-            Self::FlatPose => "the headings are not known: open the clutch, lay the hand flat and hold it for two seconds",
+            Self::OwnProfile => "the profile there is was not made with these sensors, or two of them or more have not told their ids yet",
+            Self::FlatPose => "the sensors' headings are not known since they started: a flat pose, held for two seconds, gives them",
         })
     }
 }
@@ -115,6 +115,8 @@ pub enum Refusal {
         /// By how much, radians.
         by: f32,
     },
+    /// The glove's own profile says how its sensors sit: they are not taken as ones that sit straight.
+    HasProfile,
 }
 
 impl From<flat::Refusal> for Refusal {
@@ -135,11 +137,20 @@ impl core::fmt::Display for Refusal {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let glove = match *self {
             Self::Engaged => return f.write_str("the clutch is closed: release it first"),
-            Self::NothingBefore => return f.write_str("there is no calibration to go back to"),
+            Self::NothingBefore => {
+                return f.write_str(
+                    "nothing to take back: no flat pose or calibration was asked for since the last one taken back; one that was found by itself stays",
+                );
+            }
             Self::NoProfile => return write!(f, "{}", Lack::Profile),
             Self::OtherGlove => {
                 return f.write_str(
                     "the profile is of another glove: calibrating it makes one of this",
+                );
+            }
+            Self::HasProfile => {
+                return f.write_str(
+                    "the glove has a profile of its own, so its sensors are none that sit straight",
                 );
             }
             Self::Tilted { segment, by } => {

@@ -54,6 +54,11 @@ pub enum Kind {
     ProfileFits,
     /// The profile is not this glove's (sensors as they are wired).
     ProfileMisfit(Misfit),
+    /// This sensor gives samples and no unique id: with the profile it is not used, as another may be in its place.
+    Nameless {
+        /// Index in [`glove::hand::SEGMENT_NAMES`].
+        segment: usize,
+    },
     /// A sensor of the profile's started anew: the joints beside it are held until its heading is found again, the `hand`'s until a
     /// flat pose.
     HeadingLost {
@@ -84,6 +89,8 @@ pub enum Kind {
     SensorSlipped {
         /// Index in [`glove::hand::SEGMENT_NAMES`].
         segment: usize,
+        /// It is not used until somebody calibrates: the pose was found by itself.
+        held: bool,
     },
     /// Frames come from the glove (or no longer do).
     Glove {
@@ -165,6 +172,11 @@ impl core::fmt::Display for Kind {
             Kind::Profile { is_there: false } => f.write_str("the glove has no profile"),
             Kind::ProfileFits => f.write_str("the profile is this glove's"),
             Kind::ProfileMisfit(misfit) => write!(f, "{misfit}"),
+            Kind::Nameless { segment } => write!(
+                f,
+                "sensor {} tells no id, so it may be another than the profile's: it is not used",
+                sensor(segment)
+            ),
             Kind::HeadingLost { segment: 0 } => f.write_str(
                 "sensor hand restarted, its heading is lost: open the clutch, lay the hand flat",
             ),
@@ -193,10 +205,11 @@ impl core::fmt::Display for Kind {
                 "a flat hand was seen: headings were off by up to {:.1}°",
                 off.to_degrees()
             ),
-            Kind::SensorSlipped { segment } => write!(
+            Kind::SensorSlipped { segment, held } => write!(
                 f,
-                "sensor {} seems to have slipped: check its seat, then calibrate again",
-                sensor(segment)
+                "sensor {} seems to have slipped{}: check its seat, then calibrate again",
+                sensor(segment),
+                if *held { " and is not used" } else { "" }
             ),
             Kind::Glove { answers: true } => f.write_str("the glove sends frames"),
             Kind::Glove { answers: false } => {
@@ -215,7 +228,9 @@ impl core::fmt::Display for Kind {
             ),
             Kind::ActivationRequested => f.write_str("the gripper was asked to activate: it moves"),
             Kind::Calibration(Try::Taken) => f.write_str("calibrated on the flat hand"),
-            Kind::Calibration(Try::Undone) => f.write_str("the newest calibration was taken back"),
+            Kind::Calibration(Try::Undone) => f.write_str(
+                "taken back: the newest flat pose or calibration that was asked for, with those found since",
+            ),
             Kind::Calibration(Try::Refused(why)) => write!(f, "not calibrated: {why}"),
             Kind::Calibration(Try::None | Try::Waiting) => {
                 f.write_str("calibrating: hold the hand flat and still")

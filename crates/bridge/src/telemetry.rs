@@ -48,7 +48,7 @@ pub struct Telemetry<const X: usize> {
     pub angles_valid: bool,
     /// Segments without a usable sample in the newest frame (bit k: segment k).
     pub missing: u16,
-    /// Segments whose samples look good and are not used until the next calibration: they jumped or restarted (bit k: segment
+    /// Segments whose samples look good and are not used until the next calibration: they jumped, restarted, slipped or were exchanged (bit k: segment
     /// k).
     pub distrusted: u16,
     /// Segments whose samples look good and are not used as long as they show what no hand does (bit k: segment k).

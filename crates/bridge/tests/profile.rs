@@ -208,6 +208,153 @@ fn after_a_power_cut_of_the_glove_one_flat_pose_goes_on() {
 }
 
 #[test]
+fn another_glove_put_on_the_same_port_is_not_calibrated_by_the_profile_of_the_one_before() {
+    // As after power-on, and one that runs already: its cable was put into the port.
+    for is_power in [true, false] {
+        let (mut bench, _) = following(&Wearer::new(1));
+        bench.run(3 * S);
+        let began = bench.clock.now();
+        match is_power {
+            true => bench.glove.power(false, began),
+            false => bench.glove_wire.unplug(true),
+        }
+        bench.run(900 * MS);
+        for k in 0..SEGMENT_COUNT {
+            bench.glove.exchange_sensor(k, 40 + k);
+        }
+        match is_power {
+            true => bench.glove.power(true, bench.clock.now()),
+            false => bench.glove_wire.unplug(false),
+        }
+        let mut held = false;
+        let end = bench.now() + 12 * S;
+        while bench.now() < end {
+            bench.step();
+            held |= is_not_calibrated(bench.state());
+            assert!(!bench.state().is_moving(), "power: {is_power}");
+        }
+        assert!(held, "power: {is_power}: {:?}", bench.state());
+        assert!(is_not_calibrated(bench.state()), "{:?}", bench.state());
+        assert!(bench.told(Kind::ProfileMisfit(Misfit::Differ(u16::MAX))));
+        assert_eq!(bench.app.telemetry().lacks(), Some(Lack::OwnProfile));
+        bench.release();
+        lie_flat(&mut bench);
+        assert_eq!(pose(&mut bench), Err(Refusal::OtherGlove));
+    }
+}
+
+#[test]
+fn one_sensor_exchanged_while_the_gripper_follows_is_named_and_everything_held() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(3 * S);
+    bench.glove.unplug(6, true);
+    bench.run(300 * MS);
+    bench.glove.exchange_sensor(6, 40);
+    bench.glove.reset_sensor(6, bench.clock.now());
+    bench.glove.unplug(6, false);
+    let end = bench.now() + 5 * S;
+    while bench.now() < end {
+        bench.step();
+        if bench.state() == State::Following {
+            let beside = glove::hand::joints_of_segment(6);
+            assert_eq!(bench.app.telemetry().held_joints & beside, beside);
+        }
+    }
+    assert!(is_not_calibrated(bench.state()), "{:?}", bench.state());
+    assert!(bench.told(Kind::ProfileMisfit(Misfit::Differ(1 << 6))));
+    // Put back it may sit otherwise, and its heading is another: a flat pose goes on.
+    bench.glove.exchange_sensor(6, 6);
+    bench.glove.reset_sensor(6, bench.clock.now());
+    bench.run(4 * S);
+    let telemetry = bench.app.telemetry();
+    assert!(telemetry.profile.fits);
+    assert_eq!(telemetry.distrusted, 1 << 6);
+    bench.release();
+    lie_flat(&mut bench);
+    pose(&mut bench).expect("flat");
+    bench.run(S);
+    assert_eq!(bench.app.telemetry().held_joints, 0);
+}
+
+#[test]
+fn the_same_glove_on_a_line_that_was_away_is_followed_again_by_itself() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(3 * S);
+    bench.glove_wire.unplug(true);
+    bench.run(900 * MS);
+    bench.glove_wire.unplug(false);
+    bench.until("following again", |b| b.state() == State::Following);
+    assert!(bench.app.telemetry().profile.fits);
+}
+
+#[test]
+fn without_the_ids_of_two_sensors_a_profile_is_not_taken_for_the_gloves() {
+    let wearer = Wearer::new(1);
+    let (mut bench, _) = wearing(&wearer);
+    bench.glove.unplug(6, true);
+    bench.glove.unplug(9, true);
+    bench
+        .app
+        .set_profile(Some(&wearer.profile()))
+        .expect("open");
+    bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
+    assert!(!bench.app.telemetry().profile.fits);
+    bench.glove.unplug(9, false);
+    bench.run(4 * S);
+    assert!(bench.told(Kind::ProfileFits), "one may be missing");
+    assert!(bench.app.telemetry().profile.fits);
+}
+
+#[test]
+fn a_sensor_that_slipped_as_a_found_flat_pose_shows_is_held_until_somebody_calibrates() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(3 * S);
+    // About the vertical of a flat hand, so that nothing else shows it.
+    slip(&mut bench, 13, 25.0);
+    bench.run(FLAT_AGAIN + 8 * S - bench.now());
+    assert!(bench.told(Kind::SensorSlipped {
+        segment: 13,
+        held: true
+    }));
+    let telemetry = bench.app.telemetry();
+    assert_eq!(telemetry.distrusted, 1 << 13, "and no other");
+    assert_eq!(telemetry.held_joints, BESIDE_13);
+    assert_eq!(bench.state(), State::Following);
+    bench.release();
+    slip(&mut bench, 13, -25.0);
+    pose(&mut bench).expect("flat");
+    bench.run(S);
+    assert_eq!(bench.app.telemetry().held_joints, 0);
+    bench.follow();
+}
+
+#[test]
+fn when_the_hands_sensor_slipped_everything_is_held_until_somebody_calibrates() {
+    let (mut bench, _) = following(&Wearer::new(1));
+    bench.run(3 * S);
+    slip(&mut bench, 0, 25.0);
+    bench.run(FLAT_AGAIN + 8 * S - bench.now());
+    assert!(bench.told(Kind::SensorSlipped {
+        segment: 0,
+        held: true
+    }));
+    assert_eq!(bench.app.telemetry().distrusted, 1);
+    assert!(is_not_calibrated(bench.state()), "{:?}", bench.state());
+    bench.release();
+    bench.run(100 * MS);
+    pose(&mut bench).expect("flat");
+    bench.follow();
+}
+
+/// A sensor slips in small pieces, so that it does not jump, about the vertical of a flat hand.
+fn slip(bench: &mut Bench, sensor: usize, degrees: f64) {
+    for _ in 0..10 {
+        bench.glove.slip(sensor, [0.0, 1.0, 0.0], degrees / 10.0);
+        bench.run(100 * MS);
+    }
+}
+
+#[test]
 fn a_flat_pose_can_be_taken_back_and_what_restarted_since_stays_lost() {
     let (mut bench, _) = following(&Wearer::new(1));
     bench.app.set_finds_flat(false);

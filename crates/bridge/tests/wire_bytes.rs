@@ -590,6 +590,7 @@ fn worn_answers() -> Vec<Answer> {
             segment: 14,
             by: 0.5,
         },
+        NotTaken::HasProfile,
     ];
     let mut all = vec![
         Answer::Profile(ProfilePart {

@@ -111,6 +111,8 @@ pub struct Run {
     activated: bool,
     /// The glove's sensors sit straight and share a heading; else a profile says how they sit.
     straight: bool,
+    /// Flat poses are found while the hand works.
+    finds_flat: bool,
     /// The virtual person in the glove, who lies flat when asked.
     person: Option<Listener>,
     /// It was asked to by a key: calibrations that had ended by then.
@@ -142,7 +144,8 @@ impl Run {
             file_limit: None,
             ending: None,
             activated: false,
-            straight: true,
+            straight: false,
+            finds_flat: true,
             person: None,
             asked_flat: None,
         }
@@ -360,6 +363,9 @@ impl Run {
             // One that is not taken says no word of having begun; who pressed it presses it again.
             Key::Calibrate => {
                 self.ask_flat();
+            }
+            Key::Undo => {
+                self.session.order(Order::UndoCalibration);
             }
         }
     }

@@ -357,12 +357,22 @@ fn results_of_bridges_keep_their_names() {
     let counters = Counters::default();
     let next = Command::gauntlet("bridge calibrate").option("--bridge", "/dev/ttyACM0");
     let warnings = [Warning::new("the glove is not calibrated", next)];
+    let profile = devices::KeptProfile {
+        hand: "right",
+        sensors: vec!["00112233445566778899aabbccddeeff".to_owned()],
+        ids_read: 15,
+        ids_same: 15,
+        fits: true,
+        calibrated: Some("2026-11-29T11:30:00Z".to_owned()),
+        verdict: Some("good".to_owned()),
+    };
     let bridge = devices::Bridge {
         hello: Some(&hello),
         status: &status,
         slots: &slots,
         counters: &counters,
         health: Some(&health),
+        profile: Some(&profile),
         warnings: &warnings,
     };
     golden(

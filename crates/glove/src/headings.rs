@@ -22,7 +22,7 @@ mod regain;
 mod report;
 
 pub use asked::{FLAT_FOR, Known};
-pub use report::{NotFlat, PoseReport, Reading};
+pub use report::{NotFlat, PoseReport, Reading, to_blame};
 
 /// Each joint's filter has its turn every so many scans; all joints share them out.
 pub const SPREAD: u8 = 5;

@@ -14,6 +14,7 @@ use crate::sc18im::{self, Sc18im};
 use crate::{Duration, Instant, imu, mux};
 use sensor::Sensor;
 
+mod exchange;
 mod finding;
 mod frozen;
 mod machine;
@@ -24,6 +25,7 @@ mod twins;
 mod unique;
 
 pub use finding::Finding;
+pub use unique::IdsKnown;
 
 /// One sensor's part of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]

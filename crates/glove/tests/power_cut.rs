@@ -4,7 +4,8 @@ mod common;
 
 use common::{ALL, Bench, assert_true, waving};
 use glove::Duration;
-use glove::scan::{Frame, Scanner, State};
+use glove::imu::{self, UniqueId};
+use glove::scan::{Finding, Frame, Scanner, State};
 
 /// A glove on a port whose speed can be changed.
 fn bench() -> Bench {
@@ -71,6 +72,89 @@ fn every_sensor_counts_as_started_anew_after_a_power_cut() {
     cut(&mut bench, 50_000);
     let starts = bench.scanner.counters().starts;
     assert!(starts.iter().all(|starts| *starts >= 2), "{starts:?}");
+}
+
+/// Each sensor is another, built as number 40 and on.
+fn exchange_all(bench: &Bench) {
+    for k in 0..16 {
+        bench.glove.exchange_sensor(k, 40 + k);
+    }
+}
+
+/// Every frame of `ms`: whoever gives a good sample in it has told its id since, another than in `before`. How many were whole.
+fn none_used_unasked(bench: &mut Bench, before: &[Option<UniqueId>; 16], ms: u64) -> usize {
+    let (mut whole, end) = (0, bench.clock.now().as_ticks() + ms * 1_000);
+    while bench.clock.now().as_ticks() < end {
+        let Some(frame) = bench.next_frame_until(end) else {
+            break;
+        };
+        let ids = bench.scanner.ids();
+        for k in (0..16).filter(|k| frame.good() >> k & 1 == 1) {
+            assert!(ids[k].is_some() && ids[k] != before[k], "{k}: {:?}", ids[k]);
+        }
+        whole += usize::from(frame.good() == ALL);
+    }
+    whole
+}
+
+#[test]
+fn another_glove_on_the_same_port_gives_no_sample_before_it_was_asked_who_it_is() {
+    // Its supply is cut and it comes back as after power-on; and a cable pulled out of one glove and put into another that runs.
+    for is_power in [true, false] {
+        let mut bench = bench().up();
+        bench.for_ms(1_000);
+        let before = bench.scanner.ids();
+        assert!(before.iter().all(Option::is_some));
+        match is_power {
+            true => bench.glove.power(false, bench.clock.now()),
+            false => bench.wire.unplug(true),
+        }
+        bench.for_ms(700);
+        exchange_all(&bench);
+        match is_power {
+            true => bench.glove.power(true, bench.clock.now()),
+            false => bench.wire.unplug(false),
+        }
+        let whole = none_used_unasked(&mut bench, &before, 9_000);
+        assert!(whole > 20, "power: {is_power}, {whole} whole frames");
+        let named = core::iter::from_fn(|| bench.scanner.next_finding()).filter(|finding| {
+            let other = imu::Error::OtherSensor;
+            matches!(finding, Finding::WrongSensor { error, .. } if *error == other)
+        });
+        assert_eq!(named.count(), 16, "power: {is_power}");
+    }
+}
+
+#[test]
+fn the_same_glove_on_a_line_that_was_away_goes_on_without_a_start() {
+    let mut bench = bench().up();
+    let ids = bench.scanner.ids();
+    bench.wire.unplug(true);
+    bench.for_ms(700);
+    bench.wire.unplug(false);
+    let frames = bench.for_ms(3_000);
+    assert_eq!(frames.last().map(Frame::good), Some(ALL));
+    assert_eq!(bench.scanner.counters().starts, [1; 16]);
+    assert_eq!(bench.scanner.ids(), ids);
+}
+
+#[test]
+fn one_sensor_exchanged_within_half_a_second_is_asked_who_it_is() {
+    let mut bench = bench().up();
+    let before = bench.scanner.ids();
+    bench.glove.unplug(6, true);
+    bench.for_ms(300);
+    bench.glove.exchange_sensor(6, 40);
+    bench.glove.reset_sensor(6, bench.clock.now());
+    bench.glove.unplug(6, false);
+    let end = bench.clock.now().as_ticks() + 4_000_000;
+    while let Some(frame) = bench.next_frame_until(end) {
+        let id = bench.scanner.ids()[6];
+        assert!(!frame.samples[6].health.is_good() || id != before[6]);
+    }
+    assert_ne!(bench.scanner.ids()[6], before[6]);
+    assert_eq!(bench.scanner.ids()[5], before[5]);
+    assert_eq!(bench.for_ms(100).last().map(Frame::good), Some(ALL));
 }
 
 #[test]

@@ -26,9 +26,16 @@ const ID: UniqueId = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3, 5, 8, 9, 7, 9, 3];
 
 /// Who is it? The chip id, then the unique id from page 1, twice, so that a flipped bit is not taken for another sensor.
 fn identify(a: u8, id: UniqueId) -> Vec<Expect> {
-    vec![
+    let mut script = vec![
         write(a, 0x07, 0x00), // PAGE_ID: the registers of page 0
         read(a, 0x00, &[0xA0]),
+    ];
+    script.extend(unique_id(a, id));
+    script
+}
+
+fn unique_id(a: u8, id: UniqueId) -> [Expect; 4] {
+    [
         write(a, 0x07, 0x01), // page 1
         read(a, 0x50, &id),
         read(a, 0x50, &id),
@@ -68,14 +75,27 @@ fn configure(a: u8) -> Vec<Expect> {
     ]
 }
 
-/// The mode read back, SYS_STATUS 5 and SYS_ERR 0; and once more without naming the register: does the pointer stay?
+/// The mode read back; is it still the same sensor? SYS_STATUS 5 and SYS_ERR 0; and once more without naming the register: does the
+/// pointer stay?
 fn verify(a: u8) -> Vec<Expect> {
-    vec![
-        write(a, 0x07, 0x00),
-        read(a, 0x3D, &[0x08]),
-        read(a, 0x39, &[5, 0]),
-        Expect::read(a, vec![5, 0]),
-    ]
+    let mut script = recheck(a, 0x08, ID);
+    script.extend([read(a, 0x39, &[5, 0]), Expect::read(a, vec![5, 0])]);
+    script
+}
+
+/// What does a sensor do that fell silent, and is it still the same?
+fn recheck(a: u8, mode: u8, id: UniqueId) -> Vec<Expect> {
+    let mut script = vec![write(a, 0x07, 0x00), read(a, 0x3D, &[mode])];
+    script.extend(unique_id(a, id));
+    script
+}
+
+#[test]
+fn a_sensor_that_fell_silent_is_asked_for_its_unique_id_before_it_is_sampled_or_set_up() {
+    for (mode, next) in [(0x08, None), (0x00, Some(Step::Configure))] {
+        let outcome = run_step(Step::Recheck, &recheck(EVEN, mode, ID));
+        assert_eq!((outcome.next, outcome.unique_id), (next, Some(ID)));
+    }
 }
 
 #[test]
@@ -97,6 +117,7 @@ fn bringing_up_one_sensor_that_ran_in_ndof_mode() {
     assert_eq!(then(configured), (Some(Step::Verify), 10));
     let up = run_step(Step::Verify, &verify(EVEN));
     assert_eq!((then(up), up.pointer_stays), ((None, 0), Some(true)));
+    assert_eq!(up.unique_id, Some(ID));
 }
 
 /// Runs a step of the bring-up of the even sensor; the script must be used up.

@@ -13,6 +13,6 @@ pub mod virtual_person;
 
 pub use guide::{Guide, Judged};
 pub use profile_file::Kept;
-pub use profile_store::{Found, ProfileStore, profile_of};
+pub use profile_store::{Found, ProfileStore, may_be_ideal, profile_of};
 pub use recorded::Recorded;
 pub use replay::{Replay, replay};

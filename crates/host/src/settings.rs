@@ -3,6 +3,7 @@
 //! One table ([`KEYS`]) says every key with its meaning, range and default. A key that is not in it is refused by name, with the nearest
 //! one that is; a value out of its range is refused with the range.
 
+pub mod bound;
 pub mod keys;
 pub mod place;
 mod value;

@@ -99,7 +99,7 @@ pub fn lost_sensors(health: &[Health; hand::SEGMENT_COUNT]) -> Option<String> {
 
 /// The sensors that are not used although they give orientations, by name. `distrusted`: bit k is segment k.
 pub fn distrusted_sensors(distrusted: u16) -> Option<String> {
-    let what = "jumped or restarted: its joints are held until the next calibration";
+    let what = "jumped, restarted, slipped or was exchanged: its joints are held until the next calibration";
     sensors_that(distrusted, what)
 }
 

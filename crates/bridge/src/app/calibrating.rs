@@ -7,7 +7,7 @@ use crate::calibration::{Refusal, Try};
 use crate::event::{Kind, Request};
 use crate::posture::Basis;
 use crate::{Duration, Instant};
-use glove::calibration::Bound;
+use glove::calibration::{Bound, Misfit};
 use glove::hand::flat::{FlatHand, Progress};
 use glove::hand::{Calibration, SEGMENT_COUNT};
 use glove::headings::NotFlat;
@@ -91,7 +91,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             _ if self.is_engaged() => Some(Refusal::Engaged),
             None => Some(Refusal::NoProfile),
             // A glove that has not come up yet may do so within the time.
-            Some(Err(glove::calibration::Misfit::NoIds) | Ok(())) => None,
+            Some(Err(Misfit::NoIds | Misfit::Unread(_)) | Ok(())) => None,
             Some(Err(_)) => Some(Refusal::OtherGlove),
         };
         match (refusal, self.posture.seating()) {
@@ -101,8 +101,8 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     }
 
     /// Takes the hand, flat and still for a second, as all joints at zero, for sensors that sit straight on their segments and share
-    /// one heading: virtual ones. On a real hand the angles are then wrong by tens of degrees. Ends as
-    /// [`App::calibrate_flat_hand`] does.
+    /// one heading: virtual ones. On a real hand the angles are then wrong by tens of degrees, so it is refused for a glove whose profile
+    /// is in use; of a glove without one nobody but the caller knows how its sensors sit. Ends as [`App::calibrate_flat_hand`] does.
     pub fn calibrate_straight(&mut self) {
         self.calibrate_straight_within(glove::timing::STILL_WAIT);
     }
@@ -110,10 +110,19 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     /// The same, with as much time as a person needs.
     pub fn calibrate_straight_within(&mut self, wait: Duration) {
         let now = self.board.now();
-        if self.is_engaged() {
-            return self.end_try(now, Try::Refused(Refusal::Engaged));
+        let refusal = match self.is_engaged() {
+            true => Some(Refusal::Engaged),
+            false => self.not_straight(),
+        };
+        match refusal {
+            Some(refusal) => self.end_try(now, Try::Refused(refusal)),
+            None => self.begin_try(now, wait, None),
         }
-        self.begin_try(now, wait, None);
+    }
+
+    /// Why the glove's sensors are not to be taken as ones that sit straight, if they are not: its profile says how they sit.
+    fn not_straight(&self) -> Option<Refusal> {
+        (self.posture.fit() == Some(Ok(()))).then_some(Refusal::HasProfile)
     }
 
     /// `seating`: how the profile's sensors sit, where it is for them.
@@ -223,6 +232,9 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     pub(super) fn take_pose(&mut self, now: Instant) {
         let refusal = match self.posture.fit() {
             Some(Ok(())) => None,
+            Some(Err(Misfit::NoIds | Misfit::Unread(_))) => {
+                Some(Refusal::Missing(self.posture.unread()))
+            }
             _ => Some(Refusal::OtherGlove),
         };
         if let Some(refusal) = refusal {
@@ -272,7 +284,11 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             // The clutch closed meanwhile: calibrating comes before engaging.
             _ if self.is_engaged() => self.end_try(now, Try::Refused(Refusal::Engaged)),
             Progress::Waiting { .. } => {}
-            Progress::Done(calibration) => self.replace_calibration(now, calibration),
+            Progress::Done(calibration) => match self.not_straight() {
+                // Its sensors told who they are meanwhile.
+                Some(refusal) => self.end_try(now, Try::Refused(refusal)),
+                None => self.replace_calibration(now, calibration),
+            },
             Progress::Refused(why) => {
                 let why = tilted.unwrap_or_else(|| why.into());
                 self.end_try(now, Try::Refused(why));

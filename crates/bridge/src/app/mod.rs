@@ -25,7 +25,7 @@ use crate::telemetry::{Sent, Telemetry};
 use crate::{HIDDEN, Instant};
 use calibrating::Calibrating;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::BusScanner;
+use glove::scan::{BusScanner, IdsKnown};
 use gripper::{Gripper, Status};
 use hae::image::JointOrder;
 
@@ -64,8 +64,8 @@ pub struct App<B: Board<X>, const X: usize> {
     stashed: Option<CycleEnd<B, X>>,
     gripper_error: Option<GripperError<B, X>>,
     sensors: Sensors,
-    /// How often each sensor had been started, as wired, when that was last looked at; `None` before and where the profile is new.
-    heard: Option<[u16; SEGMENT_COUNT]>,
+    /// What the sensors had told when that was last looked at; `None` before and where the profile is new.
+    heard: Option<Heard>,
     calibrating: Calibrating,
     weights: Option<(usize, u32)>,
     frame_at: Option<Instant>,
@@ -93,8 +93,18 @@ struct Sensors {
     impossible: u16,
     /// Told to have lost their heading, which is looked for.
     searching: u16,
+    /// Told to give no id.
+    nameless: u16,
     /// How often each had been started, as wired, when the calibration of straight sensors was made; `None` without one.
     starts: Option<[u16; SEGMENT_COUNT]>,
+}
+
+/// What the sensors told of themselves, as wired.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Heard {
+    /// How often each had been started.
+    starts: [u16; SEGMENT_COUNT],
+    ids: IdsKnown,
 }
 
 impl<B: Board<X>, const X: usize> App<B, X> {

@@ -103,6 +103,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
     /// Tells which sensors are lost, back, or restarted.
     fn watch_sensors(&mut self, now: Instant, frame: &Frame) {
         let missing = posture::missing(frame);
+        self.watch_unread(now, missing);
         let starts = self.scanner.counters().starts;
         for segment in 0..SEGMENT_COUNT {
             let bit = 1u16 << segment;
@@ -132,12 +133,17 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         }
     }
 
-    /// Tells what the scanner found out about the sensors. One that jumped and stayed there has lost its seat or its heading:
-    /// its joints are held until the next calibration.
+    /// Tells what the scanner found out about the sensors. One that jumped and stayed there has lost its seat or its heading, and
+    /// one that was exchanged sits otherwise: its joints are held until the next calibration.
     fn tell_findings(&mut self, now: Instant) {
         while let Some(finding) = self.scanner.next_finding() {
             let finding = finding.placed(|sensor| self.posture.segment_of(sensor));
-            if let Finding::Jumped { segment, .. } = finding {
+            if let Finding::Jumped { segment, .. }
+            | Finding::WrongSensor {
+                segment,
+                error: imu::Error::OtherSensor,
+            } = finding
+            {
                 self.posture.distrust(usize::from(segment), now);
             }
             self.tell(now, Kind::Sensors(finding));

@@ -1,6 +1,6 @@
 //! What the bridge knows and tells of a glove with a profile: whose it is, its headings, flat poses.
 
-use super::App;
+use super::{App, Heard};
 use crate::Instant;
 use crate::board::Board;
 use crate::calibration::ProfileState;
@@ -35,14 +35,16 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         self.posture.seats()
     }
 
-    /// Sensors that have started since the last frame: their ids are known then, and their headings are others.
+    /// Sensors that have started since the last frame, or told another id: whose they are, and that their headings are others.
     pub(super) fn watch_starts(&mut self, now: Instant) {
         let starts = self.scanner.counters().starts;
-        let before = self.heard.replace(starts);
+        let ids = self.scanner.ids_known();
+        let before = self.heard.replace(Heard { starts, ids });
         let fit = self.posture.fit();
-        if before != Some(starts) {
+        if before != self.heard {
             self.posture.meet(&self.scanner.ids());
         }
+        let before = before.map(|heard| heard.starts);
         if self.posture.fit() != fit {
             match self.posture.fit() {
                 Some(Err(misfit @ (Misfit::Alike(_) | Misfit::Differ(_)))) => {
@@ -63,6 +65,16 @@ impl<B: Board<X>, const X: usize> App<B, X> {
                 self.sensors.searching |= 1 << segment;
                 self.tell(now, Kind::HeadingLost { segment });
             }
+        }
+    }
+
+    /// Sensors that give samples and no id, by segment: the profile does not use them.
+    pub(super) fn watch_unread(&mut self, now: Instant, missing: u16) {
+        let nameless = self.posture.unread() & !missing;
+        let new = nameless & !self.sensors.nameless;
+        self.sensors.nameless = nameless;
+        for segment in (0..SEGMENT_COUNT).filter(|k| new >> k & 1 == 1) {
+            self.tell(now, Kind::Nameless { segment });
         }
     }
 
@@ -98,7 +110,8 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         }
     }
 
-    /// A flat pose was taken.
+    /// A flat pose was taken. Of one that a person asked for, who lies flat as in the calibration, it is told what slipped; in one that was only
+    /// found nobody looked at the glove: what slipped is not used until somebody has.
     pub(super) fn take_report(&mut self, now: Instant, report: &PoseReport) {
         self.telemetry.take_pose(report);
         let most = report.off.iter().fold(0.0, |most: f32, off| {
@@ -109,7 +122,16 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             self.tell(now, Kind::FlatPoseFound { off: most });
         }
         for segment in (0..SEGMENT_COUNT).filter(|k| report.slipped >> k & 1 == 1) {
-            self.tell(now, Kind::SensorSlipped { segment });
+            if report.found {
+                self.posture.distrust(segment, now);
+            }
+            self.tell(
+                now,
+                Kind::SensorSlipped {
+                    segment,
+                    held: report.found,
+                },
+            );
         }
     }
 

@@ -29,6 +29,11 @@ impl Posture {
         self.worn.as_ref().map(Worn::fit)
     }
 
+    /// Segments whose sensor is not used with the profile, as its id is not known (bit k: segment k).
+    pub fn unread(&self) -> u16 {
+        self.worn_in_use().map_or(0, Worn::unread)
+    }
+
     /// The headings, where there is a profile.
     pub fn headings(&self) -> Option<&Headings> {
         self.worn.as_ref().map(Worn::headings)
@@ -78,7 +83,7 @@ impl Posture {
         })
     }
 
-    /// The sensors' ids, as wired: whether the profile is this glove's.
+    /// The sensors' ids as far as they are known, as wired: whether the profile is this glove's.
     pub fn meet(&mut self, ids: &[Option<UniqueId>; SEGMENT_COUNT]) {
         if let Some(worn) = &mut self.worn {
             worn.meet(ids);
@@ -182,9 +187,16 @@ impl Posture {
         missing: u16,
         reading: &glove::headings::Reading,
     ) -> Result<Reading, HoldReason> {
-        let Some(worn) = self.worn.as_ref().filter(|_| self.is_calibrated()) else {
+        let Some(worn) = self.worn.as_ref() else {
             return Err(HoldReason::NotCalibrated);
         };
+        if let Err(Misfit::NoIds | Misfit::Unread(_)) = worn.fit() {
+            // Whose it is will show once they are back.
+            return Err(HoldReason::SensorsLost(missing));
+        }
+        if !self.is_calibrated() {
+            return Err(HoldReason::NotCalibrated);
+        }
         let profile = worn.headings().profile();
         let excess = beyond::excess_of(
             &reading.segments,

@@ -2,8 +2,8 @@
 
 use crate::Instant;
 use glove::calibration::{Align, Bound, Misfit};
-use glove::hand::{self, Calibration, Quaternion, SEGMENT_COUNT};
-use glove::headings::{Config, Headings, Known, NotFlat, PoseReport, Reading};
+use glove::hand::{Calibration, Quaternion, SEGMENT_COUNT};
+use glove::headings::{self, Config, Headings, Known, NotFlat, PoseReport, Reading};
 use glove::imu::UniqueId;
 use glove::scan::Frame;
 
@@ -19,6 +19,8 @@ pub(super) struct Worn {
     /// How often each sensor had been started, as wired.
     starts: [u16; SEGMENT_COUNT],
     fit: Result<(), Misfit>,
+    /// Segments whose sensor's id is not known: it may be another's.
+    unread: u16,
     /// A flat pose is asked for.
     posing: bool,
 }
@@ -34,6 +36,7 @@ impl Worn {
             headings: Headings::new(&seated, finding(false)),
             starts: [0; SEGMENT_COUNT],
             fit: Err(Misfit::NoIds),
+            unread: u16::MAX,
             posing: false,
         }
     }
@@ -61,13 +64,18 @@ impl Worn {
         self.fit
     }
 
-    /// The sensors' ids were read, as wired.
+    /// Segments whose sensor's id is not known (bit k): it is not used.
+    pub fn unread(&self) -> u16 {
+        self.unread
+    }
+
+    /// The sensors' ids as far as they are known, as wired.
     pub fn meet(&mut self, ids: &[Option<UniqueId>; SEGMENT_COUNT]) {
-        let bound = Bound {
-            profile: *self.headings.profile(),
-            ids: self.ids,
-        };
-        self.fit = bound.fits(ids);
+        self.fit = self.bound().fits(ids);
+        let seats = self.seats.iter().enumerate();
+        self.unread = seats
+            .filter(|(_, seat)| ids[usize::from(**seat) % SEGMENT_COUNT].is_none())
+            .fold(0, |mask, (segment, _)| mask | 1 << segment);
     }
 
     /// How often each sensor has been started, as wired. The segments whose sensor has started anew, a first start among them;
@@ -95,9 +103,10 @@ impl Worn {
         self.headings.restarted(segment, now);
     }
 
-    /// Takes a frame by segment, without the sensors in `unused`. Which segments are not known in it, and what it says of the hand.
+    /// Takes a frame by segment, without the sensors in `unused` and those whose id is not known. Which segments are not known in it, and what it says of the hand.
     pub fn take(&mut self, frame: &Frame, unused: u16, finds_flat: bool) -> (u16, Reading) {
         let mut scan = self.align.take(frame);
+        scan.good &= !self.unread;
         if !self.posing {
             scan.good &= !unused;
         }
@@ -107,7 +116,7 @@ impl Worn {
 
     /// Segments whose heading is not known: as few as explain which joints have none.
     pub fn astray(&self) -> u16 {
-        astray(self.headings.unknown())
+        headings::to_blame(self.headings.unknown())
     }
 
     /// A flat pose begins, or begins anew.
@@ -173,40 +182,5 @@ fn finding(finds_flat: bool) -> Config {
     Config {
         finds_flat,
         ..Config::default()
-    }
-}
-
-/// How many of the joints on the hand must be without a heading for it to be the hand's.
-const OF_THE_HAND: u32 = 3;
-
-/// As few segments as explain which joints have no heading (bit k: the one between segment k and its parent).
-fn astray(unknown: u16) -> u16 {
-    let on_hand = (1..SEGMENT_COUNT)
-        .filter(|&k| hand::parent(k) == Some(0))
-        .fold(0, |mask, k| mask | 1u16 << k);
-    let mut segments = u16::from((unknown & on_hand).count_ones() >= OF_THE_HAND);
-    for k in (1..SEGMENT_COUNT).filter(|k| unknown >> k & 1 == 1) {
-        let parent = hand::parent(k).unwrap_or(0);
-        if segments >> parent & 1 == 0 {
-            segments |= 1 << k;
-        }
-    }
-    segments
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn as_few_segments_as_can_be_are_without_a_heading() {
-        assert_eq!(astray(0), 0);
-        assert_eq!(astray(1 << 13 | 1 << 14), 1 << 13);
-        assert_eq!(astray(1 << 14 | 1 << 15), 1 << 14);
-        assert_eq!(astray(1 << 15), 1 << 15);
-        let on_hand = 1 << 1 | 1 << 4 | 1 << 7 | 1 << 10 | 1 << 13;
-        assert_eq!(astray(on_hand), 1);
-        assert_eq!(astray(on_hand | 1 << 14), 1 | 1 << 14);
-        assert_eq!(astray(1 << 4 | 1 << 5 | 1 << 9), 1 << 4 | 1 << 9);
     }
 }

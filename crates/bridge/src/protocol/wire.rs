@@ -137,6 +137,7 @@ enum WireNotCalibrated {
     NoProfile,
     OtherGlove,
     Tilted { segment: u8, by: f32 },
+    HasProfile,
 }
 
 #[derive(Serialize, Deserialize)]

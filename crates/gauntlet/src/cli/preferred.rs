@@ -6,7 +6,7 @@ use clap::{Arg, ArgAction};
 use host::settings::Settings;
 
 /// The setting behind an option.
-const BEHIND: [(&str, &str); 12] = [
+const BEHIND: [(&str, &str); 13] = [
     ("glove", "glove.port"),
     ("hand", "glove.hand"),
     ("gripper", "gripper.port"),
@@ -19,6 +19,7 @@ const BEHIND: [(&str, &str); 12] = [
     ("rate", "gripper.rate"),
     ("safe-action", "gripper.safe_action"),
     ("model", "teleop.model"),
+    ("find-flat", "teleop.find_flat"),
 ];
 
 /// The verbs whose options they are: those that talk to devices at real ports.

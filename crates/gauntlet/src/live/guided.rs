@@ -10,6 +10,7 @@ use ratatui::widgets::Paragraph;
 
 use super::Scene;
 use super::bars::signed;
+use super::key::Bindings;
 use super::parts::{BOLD, DIM, Heading, heading, key_lines, wrapped};
 use super::postures::{COLUMNS, ROWS, drawing};
 use host::calibration::guide::{Ask, PARTS, Stage, plan};
@@ -57,8 +58,10 @@ impl GuideView {
         let ask = &self.ask;
         let what = match ask.stage {
             Stage::Waiting => {
-                "Wear the glove, sit at a table with room for the hand, and press the space bar."
-                    .to_owned()
+                format!(
+                    "Wear the glove, sit at a table with room for the hand, and press {}.",
+                    Bindings::name(Bindings::load().clutch)
+                )
             }
             Stage::Over => return Vec::new(),
             _ => plan::words(ask.step).to_owned(),

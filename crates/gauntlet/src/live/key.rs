@@ -1,9 +1,7 @@
 //! What keys mean.
 
-use std::sync::OnceLock;
-
-use host::settings::Settings;
 use host::settings::keys::keystroke;
+use host::settings::{Settings, bound};
 
 /// What a person asked for with a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -16,6 +14,8 @@ pub enum Key {
     Open,
     /// `c`: the hand is flat now, calibrate on it.
     Calibrate,
+    /// `u`: the newest flat pose that was asked for is taken back.
+    Undo,
     /// `r`: what is asked for once more.
     Again,
 }
@@ -27,6 +27,8 @@ pub struct Bindings {
     pub clutch: u8,
     /// Takes a flat pose.
     pub calibrate: u8,
+    /// Takes one back.
+    pub undo: u8,
     /// Ends.
     pub end: u8,
 }
@@ -41,8 +43,7 @@ impl Bindings {
     /// Those that this person prefers, read once. A settings file that is wrong was refused before anything began: by the command line, or
     /// before a run is watched.
     pub fn load() -> Self {
-        static LOADED: OnceLock<Bindings> = OnceLock::new();
-        *LOADED.get_or_init(|| Self::of(&Settings::load().unwrap_or_default()))
+        Self::of(bound::once())
     }
 
     /// Those of some settings.
@@ -54,6 +55,7 @@ impl Bindings {
         Self {
             clutch: key("keys.clutch", b' '),
             calibrate: key("keys.calibrate", b'c'),
+            undo: key("keys.undo", b'u'),
             end: key("keys.end", b'q'),
         }
     }

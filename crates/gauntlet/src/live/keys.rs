@@ -132,6 +132,7 @@ impl Keyboard {
         let Bindings {
             clutch,
             calibrate,
+            undo,
             end,
         } = self.bindings;
         let ends = |byte: &u8| *byte == end || matches!(*byte, ESCAPE | CTRL_D);
@@ -142,6 +143,7 @@ impl Keyboard {
             [byte] if *byte == clutch && text => vec![Key::Open],
             [byte] if *byte == clutch => vec![Key::Clutch],
             [byte] if *byte == calibrate && !text => vec![Key::Calibrate],
+            [byte] if *byte == undo && !text => vec![Key::Undo],
             [b'r'] if !text => {
                 // Where it is no key it is text.
                 self.text = Some(now + TEXT);
@@ -151,7 +153,7 @@ impl Keyboard {
             keys if keys.iter().all(|byte| *byte == clutch) => vec![Key::Open],
             keys if keys
                 .iter()
-                .all(|byte| ends(byte) || [clutch, calibrate].contains(byte))
+                .all(|byte| ends(byte) || [clutch, calibrate, undo].contains(byte))
                 && keys.iter().any(ends) =>
             {
                 vec![Key::End]
@@ -192,6 +194,7 @@ mod tests {
         for (bytes, key) in [
             (&b" "[..], Key::Clutch),
             (b"c", Key::Calibrate),
+            (b"u", Key::Undo),
             (b"r", Key::Again),
             (b"q", Key::End),
             (b"\x1b", Key::End),
@@ -208,16 +211,19 @@ mod tests {
         let bindings = Bindings {
             clutch: b'x',
             calibrate: b'f',
+            undo: b'z',
             end: b'.',
         };
         for (bytes, key) in [
             (&b"x"[..], &[Key::Clutch][..]),
             (b"f", &[Key::Calibrate]),
+            (b"z", &[Key::Undo]),
             (b".", &[Key::End]),
             (b"\x1b", &[Key::End]),
             (b"xx", &[Key::Open]),
             (b" ", &[]),
             (b"c", &[]),
+            (b"u", &[]),
             (b"q", &[]),
         ] {
             let mut keys = Keyboard::new(bindings);

@@ -138,7 +138,7 @@ pub struct Live {
 /// Keys that were pressed before anybody looked, as what is safe: whoever pressed space then may have meant to open.
 fn safe(keys: Vec<Key>) -> Vec<Key> {
     keys.into_iter()
-        .filter(|key| *key != Key::Calibrate)
+        .filter(|key| !matches!(key, Key::Calibrate | Key::Undo))
         .map(|key| match key {
             Key::Clutch => Key::Open,
             key => key,

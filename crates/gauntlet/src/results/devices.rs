@@ -111,8 +111,29 @@ pub struct Bridge<'a> {
     pub counters: &'a Counters,
     /// Calibration, restart, stalls; a bridge of version 2 has none.
     pub health: Option<&'a Health>,
+    /// The glove's profile that it keeps, if it does.
+    pub profile: Option<&'a KeptProfile>,
     /// What was left half done, or is still to do.
     pub warnings: &'a [Warning],
+}
+
+/// The profile that a bridge keeps.
+#[derive(Debug, Serialize)]
+pub struct KeptProfile {
+    /// `right` or `left`.
+    pub hand: &'static str,
+    /// The unique ids of the sensors that it was made with, in hex, as they are wired.
+    pub sensors: Vec<String>,
+    /// How many sensors have told their ids.
+    pub ids_read: usize,
+    /// How many of those are the profile's own.
+    pub ids_same: usize,
+    /// Whether it is taken for the glove's.
+    pub fits: bool,
+    /// When it was measured, RFC 3339; `null` where it is not among the profiles of this computer.
+    pub calibrated: Option<String>,
+    /// How well it came out; the same.
+    pub verdict: Option<String>,
 }
 
 /// `bridge release`.

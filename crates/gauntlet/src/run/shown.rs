@@ -174,7 +174,11 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
         Kind::SensorLost { segment } => is_good(snapshot, *segment),
         // As long as it is so, `standing` says it.
         Kind::AxisStands { .. } => true,
-        Kind::SensorRestarted { segment } => snapshot.distrusted >> segment & 1 == 0,
+        Kind::SensorRestarted { segment }
+        | Kind::SensorSlipped {
+            segment,
+            held: true,
+        } => snapshot.distrusted >> segment & 1 == 0,
         Kind::Sensors(Finding::Jumped { segment, .. }) => snapshot.distrusted >> segment & 1 == 0,
         // As long as it is so, `standing` says it.
         Kind::Sensors(Finding::Impossible { .. }) => true,

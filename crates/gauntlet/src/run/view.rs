@@ -17,7 +17,10 @@ impl Run {
         let snapshot = self.session.snapshot();
         let progress = self.session.hub().progress();
         let mut view = View {
-            title: options.title.to_owned(),
+            title: match self.finds_flat {
+                true => options.title.to_owned(),
+                false => format!("{}, finds no flat poses", options.title),
+            },
             elapsed,
             total: options.seconds,
             state: "starting".to_owned(),
@@ -108,11 +111,16 @@ impl Run {
 /// What keys do.
 fn key_words(keys: bool, drives: bool) -> String {
     let bindings = Bindings::load();
-    let [clutch, calibrate, end] =
-        [bindings.clutch, bindings.calibrate, bindings.end].map(Bindings::name);
+    let [clutch, calibrate, undo, end] = [
+        bindings.clutch,
+        bindings.calibrate,
+        bindings.undo,
+        bindings.end,
+    ]
+    .map(Bindings::name);
     match (keys, drives) {
         (true, true) => format!(
-            "{clutch}: close or open the clutch   {calibrate}: calibrate on a flat hand   {end}: hold and end"
+            "{clutch}: clutch   {calibrate}: calibrate on a flat hand   {undo}: undo that   {end}: hold and end"
         ),
         (true, false) => format!("{end}: end"),
         (false, true) => "Ctrl-C: hold and end".to_owned(),

@@ -1,5 +1,6 @@
 //! Whose glove it is, and the flat pose that a key asks for.
 
+use anyhow::Result;
 use bridge::Duration;
 use glove::calibration::{Bound, Step};
 
@@ -17,6 +18,15 @@ impl Run {
     /// Whether the glove's sensors sit straight and share a heading; else the bridge knows how they sit, or nobody does.
     pub fn is_straight(&mut self, straight: bool) {
         self.straight = straight;
+    }
+
+    /// Whether flat poses are found while the hand works, and correct what has drifted.
+    ///
+    /// # Errors
+    /// It was not taken.
+    pub fn finds_flat(&mut self, finds: bool) -> Result<()> {
+        self.finds_flat = finds;
+        self.order(Order::FindFlat(finds))
     }
 
     /// Who lies flat when that is asked for.

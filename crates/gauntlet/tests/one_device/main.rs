@@ -4,6 +4,7 @@
 #[path = "../support/mod.rs"]
 mod support;
 
+mod bridge_profile;
 mod ends;
 mod glove_power_cut;
 mod gripper_doubted;
@@ -13,3 +14,4 @@ mod ports;
 mod sensors;
 mod simulated_glove;
 mod situations;
+mod wrong_settings;

@@ -83,6 +83,24 @@ fn a_moving_hand_is_not_calibrated_on_the_view_says_so_and_the_clutch_moves_noth
 }
 
 #[test]
+fn a_key_takes_the_newest_flat_pose_back_and_what_is_not_done_by_itself_stands_above() {
+    let bench = Bench::new(&["--find-flat", "off"]);
+    let mut terminal = Terminal::start(&bench.arguments());
+    until_shown(&mut terminal, &["all", "well", "finds no flat", "u: undo"]);
+    terminal.keys(b"u");
+    until_shown(&mut terminal, &["not", "calibrated:", "press"]);
+    terminal.keys(b"c");
+    until_shown(&mut terminal, &["all", "well"]);
+    // With the clutch closed nothing is taken back.
+    terminal.keys(b" ");
+    until_shown(&mut terminal, &["following"]);
+    terminal.keys(b"u");
+    until_shown(&mut terminal, &["refused,", "(space)"]);
+    terminal.keys(b"q");
+    assert_eq!(ends_soon(&mut terminal.child), Some(0));
+}
+
+#[test]
 fn a_refused_calibration_leaves_the_one_before_and_the_view_says_so_and_why() {
     let bench = Bench::new(&[]);
     let mut terminal = Terminal::start(&bench.arguments());

@@ -24,6 +24,10 @@ static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 const MAGIC: [u8; 4] = *b"GPRO";
 const VERSION: u8 = 1;
+/// How many sensors' ids may be unknown in a glove that a profile is taken for: one, as the hand goes on without one sensor and
+/// without two it is held anyway. Fifteen ids that fit leave no doubt whose glove it is, and one sensor or several exchanged are seen.
+const UNREAD_MOST: u32 = 1;
+
 const CRC_AT: usize = Bound::BYTES - 4;
 
 /// A profile, and the unique ids of the sensors it was made with.
@@ -77,6 +81,8 @@ impl core::error::Error for Unreadable {}
 pub enum Misfit {
     /// No sensor's id has been read yet.
     NoIds,
+    /// The ids that were read fit, but too few were: those of two sensors or more (bit k: as they are wired) are not known.
+    Unread(u16),
     /// Two sensors or more give the same id (bit k: sensor k as it is wired): nothing can be told from the ids of such a glove.
     Alike(u16),
     /// These sensors (bit k: as they are wired) are others than the profile was made with.
@@ -88,6 +94,10 @@ impl core::fmt::Display for Misfit {
         let sensors = match *self {
             Misfit::NoIds => {
                 return f.write_str("no sensor's id has been read: is the glove connected?");
+            }
+            Misfit::Unread(sensors) => {
+                f.write_str("too few sensors have told their ids; those of these are not known:")?;
+                sensors
             }
             Misfit::Alike(sensors) => {
                 f.write_str("these sensors give the same id, so no profile can be told to fit:")?;
@@ -174,14 +184,15 @@ impl Bound {
         })
     }
 
-    /// Whether the glove with these sensors is the one the profile was made with. Sensors whose id was not read (`None`) say
-    /// nothing, as long as one was.
+    /// Whether the glove with these sensors is the one the profile was made with: every id that was read is the profile's, and of at most
+    /// one sensor it was not (`None`): it is missing, and without two the hand is held anyway.
     ///
     /// # Errors
     /// [`Misfit`] names the sensors.
     pub fn fits(&self, ids: &[Option<UniqueId>; SEGMENT_COUNT]) -> Result<(), Misfit> {
         let mut alike = 0;
         let mut differ = 0;
+        let unread = unread(ids);
         for (k, id) in ids.iter().enumerate() {
             let Some(id) = id else { continue };
             for (other, _) in ids
@@ -194,16 +205,36 @@ impl Bound {
             }
             differ |= u16::from(self.ids.get(k) != Some(id)) << k;
         }
-        if ids.iter().all(Option::is_none) {
+        if unread == u16::MAX {
             Err(Misfit::NoIds)
         } else if alike != 0 {
             Err(Misfit::Alike(alike))
         } else if differ != 0 {
             Err(Misfit::Differ(differ))
+        } else if unread.count_ones() > UNREAD_MOST {
+            Err(Misfit::Unread(unread))
         } else {
             Ok(())
         }
     }
+
+    /// The same where the sensors may still be on their way: too few ids say nothing against it. Whoever uses the profile asks
+    /// [`Bound::fits`] again.
+    ///
+    /// # Errors
+    /// [`Misfit`] names the sensors; never [`Misfit::Unread`].
+    pub fn may_fit(&self, ids: &[Option<UniqueId>; SEGMENT_COUNT]) -> Result<(), Misfit> {
+        match self.fits(ids) {
+            Err(Misfit::Unread(_)) => Ok(()),
+            fits => fits,
+        }
+    }
+}
+
+/// Sensors whose id was not read (bit k: as they are wired).
+pub fn unread(ids: &[Option<UniqueId>; SEGMENT_COUNT]) -> u16 {
+    let is_unread = |(k, id): (usize, &Option<UniqueId>)| u16::from(id.is_none()) << k;
+    ids.iter().enumerate().map(is_unread).sum()
 }
 
 /// Bytes put one after the other; what has no room is left out, which the lengths above rule out.
@@ -326,7 +357,16 @@ mod tests {
         let mut some = [None; SEGMENT_COUNT];
         assert_eq!(bound.fits(&some), Err(Misfit::NoIds));
         some[7] = own[7];
-        assert_eq!(bound.fits(&some), Ok(()), "the others say nothing");
+        assert_eq!(bound.fits(&some), Err(Misfit::Unread(!(1 << 7))));
+        assert_eq!(bound.may_fit(&some), Ok(()), "the others may still come");
+        let mut missing = own;
+        missing[7] = None;
+        assert_eq!(bound.fits(&missing), Ok(()), "one may be missing");
+        missing[0] = None;
+        assert_eq!(bound.fits(&missing), Err(Misfit::Unread(1 << 7 | 1)));
+        missing[3] = Some([0xAA; 16]);
+        assert_eq!(bound.fits(&missing), Err(Misfit::Differ(1 << 3)));
+        assert_eq!(bound.may_fit(&missing), Err(Misfit::Differ(1 << 3)));
         let mut swapped = own;
         swapped.swap(8, 11);
         let misfit = bound.fits(&swapped).unwrap_err();

@@ -76,16 +76,18 @@ impl Headings {
             tilt: core::array::from_fn(|k| pose.tilt(k).unwrap_or(0.0)),
             slipped: 0,
         };
+        let mut turned = 0;
         for (k, joint) in self.joints.iter_mut().enumerate().skip(1) {
             let Some(heading) = pose.heading(k) else {
                 continue;
             };
             let allowed = checks::innovation_limit(k) + 3.0 * joint.sigma();
             report.off[k] = joint.pose(heading, at);
-            let turned = libm::fabsf(report.off[k]) > allowed;
+            turned |= u16::from(libm::fabsf(report.off[k]) > allowed) << k;
             let tilted = report.tilt[k] > checks::tilt_limit(k) + rad(6.0);
-            report.slipped |= u16::from(turned || tilted) << k;
+            report.slipped |= u16::from(tilted) << k;
         }
+        report.slipped |= super::to_blame(turned);
         report
     }
 }

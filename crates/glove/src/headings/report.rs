@@ -27,8 +27,28 @@ pub struct PoseReport {
     pub off: [f32; SEGMENT_COUNT],
     /// By segment: how far it was tilted, radians.
     pub tilt: [f32; SEGMENT_COUNT],
-    /// Segments whose sensor seems to have slipped (bit k): farther off than [`crate::calibration::checks`] allow and three times the filter's sigma.
+    /// Segments whose sensor seems to have slipped (bit k): as few as explain which joints are farther off than [`crate::calibration::checks`]
+    /// allow and three times the filter's sigma; and those tilted by more than that.
     pub slipped: u16,
+}
+
+/// How many of the joints on the hand must be concerned for it to be the hand's sensor.
+const OF_THE_HAND: u32 = 3;
+
+/// As few segments as explain what is wrong with these joints (bit k: the one between segment k and its parent): of a sensor in the
+/// middle of a finger both its joints are.
+pub fn to_blame(joints: u16) -> u16 {
+    let on_hand = (1..SEGMENT_COUNT)
+        .filter(|&k| hand::parent(k) == Some(0))
+        .fold(0, |mask, k| mask | 1u16 << k);
+    let mut segments = u16::from((joints & on_hand).count_ones() >= OF_THE_HAND);
+    for k in (1..SEGMENT_COUNT).filter(|k| joints >> k & 1 == 1) {
+        let parent = hand::parent(k).unwrap_or(0);
+        if segments >> parent & 1 == 0 {
+            segments |= 1 << k;
+        }
+    }
+    segments
 }
 
 /// Why a flat pose that was asked for is not taken.
@@ -66,3 +86,20 @@ impl core::fmt::Display for NotFlat {
 }
 
 impl core::error::Error for NotFlat {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_few_segments_as_can_be_are_to_blame() {
+        assert_eq!(to_blame(0), 0);
+        assert_eq!(to_blame(1 << 13 | 1 << 14), 1 << 13);
+        assert_eq!(to_blame(1 << 14 | 1 << 15), 1 << 14);
+        assert_eq!(to_blame(1 << 15), 1 << 15);
+        let on_hand = 1 << 1 | 1 << 4 | 1 << 7 | 1 << 10 | 1 << 13;
+        assert_eq!(to_blame(on_hand), 1);
+        assert_eq!(to_blame(on_hand | 1 << 14), 1 | 1 << 14);
+        assert_eq!(to_blame(1 << 4 | 1 << 5 | 1 << 9), 1 << 4 | 1 << 9);
+    }
+}

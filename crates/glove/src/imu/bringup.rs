@@ -43,9 +43,11 @@ pub enum Step {
     Reset,
     /// Chip id again, power mode, clock source, units, read back; then the fusion mode.
     Configure,
-    /// Mode read back, fusion running; whether the register pointer stays.
+    /// Mode read back, unique id once more (whoever was reset may have been exchanged meanwhile), fusion running; whether the
+    /// register pointer stays.
     Verify,
-    /// What a sensor that fell silent is doing: mode read back.
+    /// What a sensor that fell silent is doing, and whether it is the same one: mode read back, unique id. Another one may have
+    /// been put in its place, or it restarted.
     Recheck,
 }
 
@@ -61,6 +63,13 @@ pub struct Outcome {
     pub pointer_stays: Option<bool>,
     /// The sensor's unique id; `None` where the step did not read it, or it is none (the same byte 16 times).
     pub unique_id: Option<UniqueId>,
+}
+
+impl Step {
+    /// Whether it asks a sensor for its unique id wherever it ends with the next step but one for that, or with none.
+    pub fn reads_id(self) -> bool {
+        matches!(self, Step::Identify | Step::Verify | Step::Recheck)
+    }
 }
 
 impl Outcome {
@@ -228,6 +237,7 @@ fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result
         Step::Verify => {
             let mode = sensor.get_mode()?.bits();
             check(register::OPR_MODE, config.mode.code(), mode)?;
+            let unique_id = unique_id(i2c, address)?;
             let mut status = [0; 2];
             i2c.write_read(address, &[register::SYS_STATUS], &mut status)?;
             let [code, error] = status;
@@ -241,6 +251,7 @@ fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result
             i2c.read(address, &mut again)?;
             Ok(Outcome {
                 pointer_stays: Some(again == status),
+                unique_id,
                 ..Outcome::then(None, NO_PAUSE)
             })
         }
@@ -252,9 +263,12 @@ fn run(step: Step, i2c: &mut Replay<'_>, address: u8, config: &Config) -> Result
                 // It restarted by itself, or its supply failed: it is as after a reset.
                 Some(Step::Configure)
             } else {
-                Some(Step::Identify)
+                return then(Step::Identify, NO_PAUSE);
             };
-            Ok(Outcome::then(next, NO_PAUSE))
+            Ok(Outcome {
+                unique_id: unique_id(i2c, address)?,
+                ..Outcome::then(next, NO_PAUSE)
+            })
         }
     }
 }

@@ -141,6 +141,16 @@ fn pause(step: Step, micros: u64) -> Outcome {
 /// A unique id.
 const UNIQUE: UniqueId = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3, 5, 8, 9, 7, 9, 3];
 
+/// It is read, twice.
+fn unique(a: u8) -> [Expect; 4] {
+    [
+        Expect::write(a, vec![0x07, 0x01]),
+        Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
+        Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
+        page(a),
+    ]
+}
+
 #[test]
 fn a_unique_id_that_reads_otherwise_the_second_time_or_is_none_names_nobody() {
     let a = 0x28;
@@ -189,12 +199,10 @@ fn bring_up_makes_exactly_these_transactions() {
         Expect::write(a, vec![0x3F, 0x20]),
     ];
     script.extend(configure(a));
-    // Verify: mode read back, system status, and once more without naming the register.
-    script.extend([
-        page(a),
-        read(a, 0x3D, 0x08),
-        Expect::write_read(a, vec![0x39], vec![5, 0]),
-    ]);
+    // Verify: mode read back, unique id, system status, and once more without naming the register.
+    script.extend([page(a), read(a, 0x3D, 0x08)]);
+    script.extend(unique(a));
+    script.extend([Expect::write_read(a, vec![0x39], vec![5, 0])]);
     script.push(Expect::read(a, vec![5, 0]));
     let mut bus = scripted(&script);
     let identified = Outcome {
@@ -215,7 +223,7 @@ fn bring_up_makes_exactly_these_transactions() {
         next: None,
         pause: Duration::from_ticks(0),
         pointer_stays: Some(true),
-        unique_id: None,
+        unique_id: Some(UNIQUE),
     };
     assert_eq!(run(Step::Verify, a, &mut bus), Ok(up));
     bus.release().done();
@@ -273,6 +281,10 @@ fn what_is_wrong_at_bring_up_is_named() {
         read(a, 0x3D, 0x00),
         page(a),
         read(a, 0x3D, 0x08),
+        Expect::write(a, vec![0x07, 0x01]),
+        Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
+        Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
+        page(a),
         Expect::write_read(a, vec![0x39], vec![1, 3]),
     ]);
     let absent = Error::Bus {
@@ -300,12 +312,12 @@ fn what_is_wrong_at_bring_up_is_named() {
 #[test]
 fn a_register_pointer_that_runs_on_is_noticed() {
     let a = 0x29;
-    let script = [
-        page(a),
-        read(a, 0x3D, 0x08),
+    let mut script = vec![page(a), read(a, 0x3D, 0x08)];
+    script.extend(unique(a));
+    script.extend([
         Expect::write_read(a, vec![0x39], vec![5, 0]),
         Expect::read(a, vec![0, 0]),
-    ];
+    ]);
     let mut bus = scripted(&script);
     assert_eq!(
         run(Step::Verify, a, &mut bus).unwrap().pointer_stays,
@@ -323,8 +335,13 @@ fn a_recheck_tells_a_glitch_from_a_restart() {
         (0x0C, Some(Step::Identify)),
     ];
     for (mode, next) in cases {
-        let mut bus = scripted(&[page(a), read(a, 0x3D, mode)]);
-        assert_eq!(run(Step::Recheck, a, &mut bus).unwrap().next, next);
+        let mut script = vec![page(a), read(a, 0x3D, mode)];
+        let reads_id = next != Some(Step::Identify);
+        script.extend(unique(a).into_iter().filter(|_| reads_id));
+        let mut bus = scripted(&script);
+        let outcome = run(Step::Recheck, a, &mut bus).unwrap();
+        assert_eq!(outcome.next, next);
+        assert_eq!(outcome.unique_id, reads_id.then_some(UNIQUE));
         bus.release().done();
     }
 }

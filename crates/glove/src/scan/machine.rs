@@ -128,7 +128,15 @@ impl<B: Bus> BusScanner<B> {
     /// Nobody looked at the bus for so long that the reply says nothing about now: it is asked for anew. A scan begins anew as
     /// a whole, since the samples it has are as old; a step makes its transaction again by itself.
     fn ask_again(&mut self, job: Job, now: Instant) {
-        if let (Job::Sample { .. }, Phase::Reading { .. }) = (job, self.phase) {
+        let (Job::Sample { .. }, Phase::Reading { began, .. }) = (job, self.phase) else {
+            return;
+        };
+        if self.ask_who_is_there(now) {
+            self.phase = Phase::Between {
+                began,
+                stepped: false,
+            };
+        } else {
             self.begin_reading(now);
         }
     }
@@ -251,7 +259,7 @@ impl<B: Bus> BusScanner<B> {
                     }
                 }
                 Phase::Between { began, stepped } => {
-                    if !stepped && self.begin_step(now) {
+                    if (!stepped || self.is_in_doubt()) && self.begin_step(now) {
                         self.phase = Phase::Between {
                             began,
                             stepped: true,
@@ -342,7 +350,7 @@ impl<B: Bus> BusScanner<B> {
     fn begin_scan(&mut self, began: Instant, now: Instant) -> bool {
         let first = self.counters.frames == 0;
         let due = first || now >= after(began, self.config.period);
-        if !due || !self.sensors.iter().any(Sensor::is_running) {
+        if !due || self.ask_who_is_there(now) || !self.sensors.iter().any(Sensor::is_running) {
             // Another step may come due before the next scan.
             self.phase = Phase::Between {
                 began,

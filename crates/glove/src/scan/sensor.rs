@@ -46,6 +46,12 @@ pub(super) struct Sensor {
     pub returned: Option<Return>,
     /// What went wrong with it last.
     pub trouble: Option<Trouble>,
+    /// Its unique id was read since it started over last: what is known of it is of this sensor.
+    pub is_identified: bool,
+    /// It is asked who it is, after a time in which another may have been put in its place.
+    pub is_doubtful: bool,
+    /// When it answered last, whatever it said.
+    answered: Instant,
     good: Option<(Quaternion, Instant)>,
     /// Nobody looked at any sensor for a while, and until then it was good: it was not away.
     unseen: bool,
@@ -79,6 +85,9 @@ impl Sensor {
             is_twin: false,
             returned: None,
             trouble: None,
+            is_identified: false,
+            is_doubtful: false,
+            answered: NEVER,
             good: None,
             unseen: false,
             asked: NEVER,
@@ -152,6 +161,7 @@ impl Sensor {
         counters.repaired = counters.repaired.wrapping_add(u32::from(mended));
         self.raw = Some(raw);
         self.pointer_set = true;
+        self.answered = stamp;
         match self.judge(&raw, stamp) {
             Ok(orientation) => {
                 let orientation = match self.good {
@@ -331,6 +341,19 @@ impl Sensor {
         }
     }
 
+    /// Whether it has been sampled and gave no answer for longer than `longest`.
+    pub fn is_silent(&self, now: Instant, longest: Duration) -> bool {
+        self.is_running() && since(now, self.answered) > longest
+    }
+
+    /// Another may be in its place: it is asked who it is before it is sampled again.
+    pub fn ask_who(&mut self, now: Instant) {
+        self.forget();
+        self.health = Health::Starting;
+        (self.step, self.due, self.tries) = (Some(Step::Recheck), now, 0);
+        self.is_doubtful = true;
+    }
+
     /// It may not be the sensor it was taken for: it starts over.
     pub fn doubt(&mut self, error: Error, now: Instant) {
         self.restart(error, now);
@@ -348,6 +371,7 @@ impl Sensor {
         (self.step, self.due) = (Some(Step::Identify), after(now, wait));
         (self.tries, self.bad, self.rechecks, self.tried) = (0, 0, 0, true);
         self.asked = NEVER;
+        (self.is_identified, self.is_doubtful) = (false, false);
         self.forget();
     }
 

@@ -61,7 +61,7 @@ const ALL: u16 = 0xFFFF;
 #[test]
 fn all_sensors_are_reset_before_the_one_wait_and_frames_come_soon_after() {
     let mut run = Run::new(moving);
-    let frames = run.until(1_200_000);
+    let frames = run.until(1_300_000);
     assert!(frames.len() > 3, "{} frames", frames.len());
     assert!(frames.iter().all(|f| f.good() == ALL), "{:?}", frames[0]);
     assert_eq!(run.scanner.state(), State::Scanning);
@@ -379,7 +379,7 @@ fn a_dead_link_costs_nothing_but_its_state_and_the_sensors_are_not_blamed() {
     // Nobody knows what the sensors' register pointers did meanwhile.
     (0..16).for_each(|k| run.chip(k).pointer = 0);
     run.scanner.bus_mut().up = true;
-    let frames = run.for_ms(100);
+    let frames = run.for_ms(300);
     assert_eq!(frames.last().unwrap().good(), ALL);
     assert_eq!(
         run.scanner.counters().restarted,

@@ -93,17 +93,26 @@ impl Bench {
 
     /// Runs until the next frame.
     pub fn next_frame(&mut self) -> Frame {
-        let late = self.clock.now() + glove::Duration::from_ticks(3_000_000);
+        let late = self.clock.now().as_ticks() + 3_000_000;
+        match self.next_frame_until(late) {
+            Some(frame) => frame,
+            None => panic!("no frame: {:?}", self.scanner.health()),
+        }
+    }
+
+    /// Runs until the next frame, or the time given.
+    pub fn next_frame_until(&mut self, late: u64) -> Option<Frame> {
+        let late = Instant::from_ticks(late);
         while self.clock.now() < late {
             let now = self.clock.now();
             if let Some(frame) = self.scanner.poll(now) {
-                return frame;
+                return Some(frame);
             }
             let due = self.scanner.next_due().unwrap_or(late).min(late);
             let next = Instant::from_ticks(now.as_ticks() + 1);
             self.clock.wait_until(due.max(next));
         }
-        panic!("no frame: {:?}", self.scanner.health());
+        None
     }
 
     pub fn for_ms(&mut self, ms: u64) -> Vec<Frame> {

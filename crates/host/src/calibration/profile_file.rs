@@ -28,6 +28,18 @@ pub struct Kept {
     pub calibrated: String,
     /// How well.
     pub quality: Quality,
+    /// Of whom.
+    pub made_by: MadeBy,
+}
+
+/// Who made a profile.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum MadeBy {
+    /// Somebody who led a hand through a calibration.
+    #[default]
+    Calibrate,
+    /// `simulate`, of its own person.
+    Simulate,
 }
 
 /// How well a glove was calibrated: the largest value of each check.
@@ -56,6 +68,8 @@ struct File {
     calibrated: toml::value::Datetime,
     hand: String,
     crc: String,
+    /// Only `simulate` says who it is.
+    made_by: Option<String>,
     thumb_base: [f64; 4],
     quality: Quality,
     segments: BTreeMap<String, Segment>,
@@ -111,13 +125,17 @@ profile = {VERSION}
 calibrated = {}
 hand = \"{hand}\"
 crc = \"{}\"
-# How the thumb's frames lie in the hand's while the hand is flat: w, x, y, z.
+{}# How the thumb's frames lie in the hand's while the hand is flat: w, x, y, z.
 thumb_base = {}
 # The sensors' unique ids, in the order as they are wired: 0 is channel 0 at address 0x28, 1 the same at 0x29.
 sensors = [
 ",
             self.calibrated,
             crc_text(&self.bound),
+            match self.made_by {
+                MadeBy::Calibrate => "",
+                MadeBy::Simulate => "# Of a virtual person: simulate writes it anew.\nmade_by = \"simulate\"\n",
+            },
             numbers(&components(&profile.thumb_base)),
         );
         for (k, id) in self.bound.ids.iter().enumerate() {
@@ -188,6 +206,15 @@ findings = [",
                 )));
             }
         };
+        let made_by = match file.made_by.as_deref() {
+            None => MadeBy::Calibrate,
+            Some("simulate") => MadeBy::Simulate,
+            Some(other) => {
+                return Err(wrong(format!(
+                    "made_by = \"{other:.40}\" is not known: only \"simulate\" is written there"
+                )));
+            }
+        };
         let count = file.sensors.len();
         if count != SEGMENT_COUNT {
             return Err(wrong(format!(
@@ -239,6 +266,7 @@ findings = [",
             bound,
             calibrated: file.calibrated.to_string(),
             quality: file.quality,
+            made_by,
         })
     }
 

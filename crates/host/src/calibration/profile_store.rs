@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use glove::calibration::Misfit;
+use glove::calibration::{Misfit, Profile};
 use glove::hand::SEGMENT_COUNT;
 use glove::imu::UniqueId;
 
-use super::profile_file::Kept;
+use super::profile_file::{Kept, MadeBy};
 use crate::failure::Failure;
 use crate::settings::place;
 use crate::words;
@@ -33,7 +33,8 @@ pub enum Found {
     Nothing,
 }
 
-/// The profile of the glove with these ids: the named one, else what they find among this user's. Else why there is none.
+/// The profile of the glove with these ids: the named one, else what they find among this user's. Else why there is none. Sensors may
+/// still be on their way: who uses it asks [`glove::calibration::Bound::fits`].
 ///
 /// # Errors
 /// The named file is none, or this user's cannot be looked at.
@@ -43,7 +44,7 @@ pub fn profile_of(
 ) -> Result<Result<(PathBuf, Box<Kept>), String>, Failure> {
     if let Some(path) = named {
         let kept = Kept::read(path)?;
-        return Ok(match kept.bound.fits(ids) {
+        return Ok(match kept.bound.may_fit(ids) {
             Ok(()) => Ok((path.to_owned(), Box::new(kept))),
             Err(misfit) => Err(format!("{}: {misfit}", path.display())),
         });
@@ -51,7 +52,37 @@ pub fn profile_of(
     ProfileStore::usual()?.profile_of(ids)
 }
 
+/// Whether a glove with these ids may be taken as one whose sensors sit straight and share a heading, though somebody says so (`--ideal`):
+/// none that has a profile which says how they sit.
+///
+/// # Errors
+/// Its profile; or this user's cannot be looked at.
+pub fn may_be_ideal(place: &Path, ids: &[Option<UniqueId>; SEGMENT_COUNT]) -> Result<(), Failure> {
+    ProfileStore::usual()?.may_be_ideal(place, ids)
+}
+
 impl ProfileStore {
+    fn may_be_ideal(
+        &self,
+        place: &Path,
+        ids: &[Option<UniqueId>; SEGMENT_COUNT],
+    ) -> Result<(), Failure> {
+        let Found::Fits(path, kept) = self.find(ids)? else {
+            return Ok(());
+        };
+        let profile = &kept.bound.profile;
+        if *profile == Profile::straight(profile.side) {
+            return Ok(());
+        }
+        let what = format!(
+            "--ideal is not for the glove on {}: by its profile {} its sensors do not sit straight",
+            place.display(),
+            path.display()
+        );
+        let next = "the same without --ideal: the profile is found by itself";
+        Err(Failure::new(what, next))
+    }
+
     /// Where this user's profiles lie.
     ///
     /// # Errors
@@ -129,6 +160,31 @@ impl ProfileStore {
         Ok(path)
     }
 
+    /// Keeps the profile of a virtual person, where none is there or one that `simulate` made itself; returns its path. One that somebody
+    /// else made for this glove stays as it is: that one is returned, too. What cannot be read stays beside it with `.before` behind its name.
+    ///
+    /// # Errors
+    /// As [`ProfileStore::save`], [`ProfileStore::list`].
+    pub fn save_simulated(
+        &self,
+        kept: &Kept,
+    ) -> Result<Result<PathBuf, (PathBuf, Box<Kept>)>, Failure> {
+        let ids = kept.bound.ids.map(Some);
+        if let Some((path, other)) = self.list()?.into_iter().find_map(|(path, other)| {
+            let other = other.ok().filter(|other| other.bound.fits(&ids).is_ok())?;
+            (other.made_by != MadeBy::Simulate).then_some((path, other))
+        }) {
+            return Ok(Err((path, Box::new(other))));
+        }
+        let path = self.path_of(&kept.bound.ids);
+        if Kept::read(&path).is_ok() {
+            // Its own of before: what stands beside it is somebody's.
+            kept.write(&path)?;
+            return Ok(Ok(path));
+        }
+        self.save(kept).map(Ok)
+    }
+
     /// Every profile, by name; what cannot be read with why.
     ///
     /// # Errors
@@ -163,7 +219,7 @@ impl ProfileStore {
         let mut nearest: Option<(PathBuf, Misfit, u32)> = None;
         for (path, kept) in self.list()? {
             let Ok(kept) = kept else { continue };
-            match kept.bound.fits(ids) {
+            match kept.bound.may_fit(ids) {
                 Ok(()) => {
                     if best
                         .as_ref()
@@ -223,6 +279,35 @@ mod tests {
     }
 
     #[test]
+    fn a_simulated_profile_takes_only_the_place_of_none_and_of_its_own_kind() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = ProfileStore::at(folder.path());
+        let simulated = kept(2);
+        assert_eq!(simulated.made_by, MadeBy::Simulate);
+        let path = store.save_simulated(&simulated).unwrap().unwrap();
+        let mut again = simulated.clone();
+        again.calibrated = "2027-01-01T00:00:00Z".to_owned();
+        assert_eq!(store.save_simulated(&again).unwrap(), Ok(path.clone()));
+        assert_eq!(Kept::read(&path).unwrap(), again);
+        let before = path.with_extension("toml.before");
+        assert!(!before.exists());
+        // Somebody calibrates the same person.
+        let measured = Kept {
+            made_by: MadeBy::Calibrate,
+            ..simulated.clone()
+        };
+        assert_eq!(store.save(&measured).unwrap(), path);
+        let (there, other) = store.save_simulated(&simulated).unwrap().unwrap_err();
+        assert_eq!((there, *other), (path.clone(), measured.clone()));
+        assert_eq!(Kept::read(&path).unwrap(), measured);
+        // What cannot be read is kept beside it.
+        std::fs::write(&path, "broken").unwrap();
+        assert_eq!(store.save_simulated(&simulated).unwrap(), Ok(path.clone()));
+        assert_eq!(Kept::read(&path).unwrap(), simulated);
+        assert_eq!(std::fs::read_to_string(before).unwrap(), "broken");
+    }
+
+    #[test]
     fn a_profile_that_came_out_bad_is_not_found_and_the_one_before_it_is_still_there() {
         let folder = tempfile::tempdir().unwrap();
         let store = ProfileStore::at(folder.path());
@@ -238,6 +323,23 @@ mod tests {
         let before = path.with_extension("toml.before");
         assert_eq!(Kept::read(&before).unwrap(), good);
         assert_eq!(store.list().unwrap().len(), 1);
+    }
+
+    #[test]
+    fn a_glove_with_a_profile_is_taken_as_ideal_only_where_that_says_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let store = ProfileStore::at(folder.path());
+        let mut kept = kept(1);
+        let ids = kept.bound.ids.map(Some);
+        let place = Path::new("/dev/g");
+        assert!(store.may_be_ideal(place, &ids).is_ok());
+        let path = store.save(&kept).unwrap();
+        let refused = store.may_be_ideal(place, &ids).unwrap_err().to_string();
+        assert!(refused.contains(&path.display().to_string()), "{refused}");
+        assert!(refused.contains("/dev/g"), "{refused}");
+        kept.bound.profile = Profile::straight(kept.bound.profile.side);
+        store.save(&kept).unwrap();
+        assert!(store.may_be_ideal(place, &ids).is_ok());
     }
 
     #[test]

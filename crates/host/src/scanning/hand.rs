@@ -56,9 +56,14 @@ pub struct Hand {
     flat: Flat,
     /// The flat pose under way, and when its time is over.
     pose: Option<(FlatHand, glove::Instant)>,
-    /// How often each sensor had started, as wired; `None` before the first scan.
-    starts: Option<[u16; SEGMENT_COUNT]>,
+    /// How often each sensor had started and whose ids were known, as wired; `None` before the first scan.
+    heard: Option<Heard>,
 }
+
+type Heard = (
+    [u16; SEGMENT_COUNT],
+    [Option<glove::imu::UniqueId>; SEGMENT_COUNT],
+);
 
 impl Hand {
     /// A glove whose sensors sit straight on their segments and share one heading.
@@ -67,7 +72,7 @@ impl Hand {
             posture: Posture::new(side, None),
             flat: Flat::None,
             pose: None,
-            starts: None,
+            heard: None,
         }
     }
 
@@ -138,12 +143,12 @@ impl Hand {
 
     /// Sensors that started since the scan before: whose they are, and that their headings are others.
     fn hear(&mut self, scanned: &Scanned) {
-        let before = self.starts.replace(scanned.starts);
-        if before != Some(scanned.starts) {
+        let before = self.heard.replace((scanned.starts, scanned.ids));
+        if before != self.heard {
             self.posture.meet(&scanned.ids);
         }
         if self.posture.calibration().is_some()
-            && let Some(before) = before
+            && let Some((before, _)) = before
         {
             for k in (0..SEGMENT_COUNT).filter(|&k| before[k] != scanned.starts[k]) {
                 self.posture.distrust(k, scanned.at);

@@ -6,6 +6,7 @@ use bridge::event::Kind;
 use super::devices::{Devices, and};
 use crate::failure::Failure;
 use crate::next::{Command, NextStep, advice};
+use crate::settings::bound::key;
 
 /// Why the hand was not taken, and what helps.
 pub fn refused(why: Refusal, devices: &Devices) -> Failure {
@@ -43,9 +44,14 @@ pub(super) fn told(what: &Kind, now: &CalibrationState) -> String {
 /// Why, with what a person at the keys can press.
 fn words(why: Refusal) -> String {
     match why {
-        Refusal::Engaged => "the clutch is closed: open it first (space)".to_owned(),
+        Refusal::Engaged => format!("the clutch is closed: open it first ({})", clutch()),
         why => why.to_string(),
     }
+}
+
+/// The clutch's key.
+fn clutch() -> String {
+    key("keys.clutch")
 }
 
 fn next(why: Refusal, devices: &Devices) -> NextStep {
@@ -66,7 +72,7 @@ fn next(why: Refusal, devices: &Devices) -> NextStep {
             "the same again, the palm on a table and the fingers stretched".into()
         }
         Refusal::Engaged => and(
-            "in the view space opens it",
+            &format!("in the view {} opens it", clutch()),
             devices.bridge("bridge release"),
             " where another host left it closed",
         ),
@@ -82,6 +88,7 @@ fn next(why: Refusal, devices: &Devices) -> NextStep {
                 .then(" shows where it is), or --ideal for virtual sensors that sit straight"),
         },
         Refusal::NothingBefore => "calibrating on a flat hand".into(),
+        Refusal::HasProfile => "the same without --ideal: one flat pose by its profile calibrates the glove".into(),
     }
 }
 

@@ -30,6 +30,16 @@ impl Worker {
         Ok(())
     }
 
+    /// Takes the newest calibration back, and tells how that ended.
+    pub(super) fn undo(&mut self) -> Result<(), Error> {
+        self.trying = None;
+        self.link.undo_calibration()?;
+        let now = self.link.health()?.calibration;
+        self.calibration.is_calibrated = now.is_calibrated;
+        self.calibrated(now.newest);
+        Ok(())
+    }
+
     /// Another profile, kept by the bridge; refused while the clutch is closed.
     pub(super) fn set_profile(&mut self, profile: Option<&Bound>) -> Result<(), Error> {
         match self.link.set_profile(profile) {
@@ -100,6 +110,6 @@ fn calibrate(link: &mut HostLink, is_straight: bool) -> Result<(), Error> {
 fn may_come(why: Refusal) -> bool {
     !matches!(
         why,
-        Refusal::Engaged | Refusal::NoProfile | Refusal::OtherGlove
+        Refusal::Engaged | Refusal::NoProfile | Refusal::OtherGlove | Refusal::HasProfile
     )
 }

@@ -248,12 +248,14 @@ impl Worker {
                 (self.touched, self.activation_asked) = (true, true);
                 self.link.activate()?;
             }
-            Order::FlatPose(_) | Order::CalibrateStraight(_) if self.epoch.is_some() => {
+            Order::FlatPose(_) | Order::CalibrateStraight(_) | Order::UndoCalibration
+                if self.epoch.is_some() =>
+            {
                 self.calibrated(Try::Refused(Refusal::Engaged));
             }
             Order::FlatPose(wait) => self.begin_try(wait, false)?,
             Order::CalibrateStraight(wait) => self.begin_try(wait, true)?,
-            Order::UndoCalibration => self.link.undo_calibration()?,
+            Order::UndoCalibration => self.undo()?,
             Order::FindFlat(on) => self.link.find_flat(on)?,
             Order::Stop => {}
         }

@@ -8,6 +8,7 @@ use super::driven::Driven;
 use crate::failure::Failure;
 use crate::next::{Command, NextStep};
 use crate::realtime;
+use crate::settings::bound::key;
 use crate::stats::seconds;
 
 /// What a person is told whose order to close the clutch was too old when it came.
@@ -86,7 +87,7 @@ impl Ending {
         if self.driver.too_late && !self.driver.attended {
             return Some(Failure::new(
                 format!("{CLOSED_TOO_LATE}, and the gripper followed nobody"),
-                "the same on a computer that neither sleeps nor has so much to do; on a terminal, space closes the clutch",
+                on_a_better_computer("closes the clutch"),
             ));
         }
         if !self.gripper_answers {
@@ -274,7 +275,15 @@ fn grows_old(reason: HoldReason) -> bool {
 fn clutch_expired() -> Failure {
     Failure::new(
         "the clutch opened by itself, since no heartbeat came for 1 s; the gripper was held from then on",
-        "the same on a computer that neither sleeps nor has so much to do; on a terminal, space closes the clutch again",
+        on_a_better_computer("closes the clutch again"),
+    )
+}
+
+/// `does`: what the clutch's key does on a terminal.
+fn on_a_better_computer(does: &str) -> String {
+    format!(
+        "the same on a computer that neither sleeps nor has so much to do; on a terminal, {} {does}",
+        key("keys.clutch")
     )
 }
 

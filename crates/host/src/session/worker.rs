@@ -277,6 +277,7 @@ fn sort(kind: &Kind) -> Sort {
         | Kind::HeadingLost { .. }
         | Kind::Unsure { .. }
         | Kind::SensorSlipped { .. }
+        | Kind::Nameless { .. }
         | Kind::ProfileMisfit(_)
         | Kind::Sensors(_)
         | Kind::AxisStands { .. }

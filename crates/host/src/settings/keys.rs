@@ -136,12 +136,24 @@ pub const KEYS: &[Key] = &[
         "The trained model (--model).",
     ),
     key(
+        "teleop.find_flat",
+        Kind::Choice(&["on", "off"]),
+        "\"on\"",
+        "Whether flat poses are found while the hand works, and correct what has drifted (--find-flat): on or off.",
+    ),
+    key(
         "keys.clutch",
         Kind::Key,
         "\"space\"",
         "Closes and opens the clutch.",
     ),
     key("keys.calibrate", Kind::Key, "\"c\"", "Takes a flat pose."),
+    key(
+        "keys.undo",
+        Kind::Key,
+        "\"u\"",
+        "Takes the newest flat pose back that was asked for.",
+    ),
     key(
         "keys.end",
         Kind::Key,

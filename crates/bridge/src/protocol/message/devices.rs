@@ -22,7 +22,7 @@ pub struct Devices {
     pub missing: u16,
     /// What is wrong with the first of them.
     pub sensors: Vec<UnusedSensor, CAUSES>,
-    /// Segments whose samples look good and are not used until the next calibration: they jumped or restarted (bit k: segment
+    /// Segments whose samples look good and are not used until the next calibration: they jumped, restarted, slipped or were exchanged (bit k: segment
     /// k).
     pub distrusted: u16,
     /// Segments whose samples look good and are not used as long as they show what no hand does (bit k: segment k).

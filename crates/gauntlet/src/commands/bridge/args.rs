@@ -32,7 +32,7 @@ pub struct Bridge {
 /// What can be done with a bridge on a chip.
 #[derive(Debug, Subcommand)]
 pub enum BridgeVerb {
-    /// Show what the bridge does, what its slots hold, and its counters.
+    /// Show what the bridge does, whose profile it keeps, what its slots hold, and its counters.
     Status {
         /// Where it is.
         #[command(flatten)]
@@ -65,11 +65,14 @@ pub enum BridgeVerb {
         /// Take the newest calibration back instead.
         #[arg(long)]
         undo: bool,
-        /// Give the bridge this profile of the glove before; it keeps it over restarts.
-        #[arg(long, value_name = "FILE.toml", conflicts_with = "undo")]
+        /// Take the profile away that the bridge keeps, instead.
+        #[arg(long, conflicts_with = "undo")]
+        forget: bool,
+        /// Give the bridge this profile of the glove before; it keeps it over restarts. Refused for a glove with other sensors.
+        #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["undo", "forget"])]
         profile: Option<PathBuf>,
-        /// Take the sensors as ideal: sewn on straight, with one heading. Virtual gloves only.
-        #[arg(long, conflicts_with_all = ["undo", "profile"])]
+        /// Take the sensors as ideal: sewn on straight, with one heading. Virtual gloves only; refused with a profile of the glove.
+        #[arg(long, conflicts_with_all = ["undo", "forget", "profile"])]
         ideal: bool,
     },
     /// Open the clutch: end the hold that a vanished host has left; the gripper stays where it is.

@@ -8,6 +8,7 @@ use bridge::protocol::message::Health;
 
 use super::args::BridgeAt;
 use super::drive::{Flat, start};
+use super::profile;
 use crate::results::{self, devices};
 use crate::tell::Tell;
 use crate::wearer::Listener;
@@ -25,7 +26,9 @@ pub(super) fn undo(at: &BridgeAt) -> Result<()> {
     if let Try::Refused(why @ Refusal::NothingBefore) = health.calibration.newest {
         return Err(refused(why, &at.devices()).into());
     }
-    tell.say(format_args!("the newest calibration was taken back"));
+    tell.say(format_args!(
+        "the newest flat pose or calibration that was asked for was taken back, with those found since"
+    ));
     if at.json {
         return results::print("bridge calibrate", devices::Calibrated { health: &health });
     }
@@ -34,22 +37,18 @@ pub(super) fn undo(at: &BridgeAt) -> Result<()> {
 
 pub(super) fn calibrate(
     at: &BridgeAt,
-    profile: Option<&Path>,
+    given: Option<&Path>,
     flat: Flat,
     interrupt: &Interrupt,
 ) -> Result<()> {
     let tell = Tell::new(at.json);
-    let profile = profile.map(|path| Kept::read(path).map(|kept| (path, kept)));
-    let profile = profile.transpose()?;
+    let given = given.map(|path| Kept::read(path).map(|kept| (path, kept)));
+    let given = given.transpose()?;
     let mut link = at.connect()?;
     // An older bridge is refused by name.
     let health = at.told(link.health())?;
-    if let Some((path, kept)) = &profile {
-        at.told(link.set_profile(Some(&kept.bound)))?;
-        tell.say(format_args!(
-            "profile    {}  is kept by the bridge",
-            path.display()
-        ));
+    if let Some((path, kept)) = &given {
+        profile::give(&mut link, at, (path, kept), &tell, interrupt)?;
     }
     let now = flat_pose(link, at.devices(), flat.ideal, None, &tell, interrupt)?;
     if at.json {

@@ -14,6 +14,7 @@ use host::chip::link::HostLink;
 use host::clock::Clock;
 use host::interrupt::Interrupt;
 use host::session::{Devices, OnChip};
+use host::settings::Settings;
 
 /// A flat pose.
 #[derive(Debug, Clone, Copy)]
@@ -30,6 +31,8 @@ pub(super) fn engage(
     interrupt: &Interrupt,
 ) -> Result<()> {
     let tell = Tell::new(at.json);
+    // Whose keys are not known is refused before anything moves.
+    Settings::load()?;
     let mut link = at.connect()?;
     // An older bridge is refused before anything moves.
     at.told(link.health())?;

@@ -4,6 +4,7 @@ mod args;
 mod calibrate;
 mod drive;
 mod poses;
+mod profile;
 mod status;
 mod watch;
 
@@ -43,6 +44,9 @@ pub(crate) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
             drive::engage(at, flat, *activate, *seconds, interrupt)
         }
         BridgeVerb::Calibrate { at, undo: true, .. } => calibrate::undo(at),
+        BridgeVerb::Calibrate {
+            at, forget: true, ..
+        } => profile::forget(at),
         BridgeVerb::Calibrate {
             at, profile, ideal, ..
         } => {

@@ -6,6 +6,7 @@ use bridge::protocol::message::{Health, Restart, Status};
 use gripper::{Activation, Fault};
 
 use super::args::BridgeAt;
+use super::profile;
 use crate::commands::flash::slot_lines;
 use crate::results::{self, devices};
 use crate::tell::Tell;
@@ -29,6 +30,10 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
         Err(Error::Older { .. }) => None,
         health => Some(at.told(health)?),
     };
+    let profile = match health {
+        Some(_) => profile::kept(&mut link, at)?,
+        None => None,
+    };
     let warnings = warnings(&status, health.as_ref(), at);
     if at.json {
         let bridge = devices::Bridge {
@@ -37,6 +42,7 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
             slots: &slots,
             counters: &counters,
             health: health.as_ref(),
+            profile: profile.as_ref(),
             warnings: &warnings,
         };
         return results::print("bridge status", bridge);
@@ -63,6 +69,9 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
         health_lines(health)
             .iter()
             .for_each(|line| tell.say(format_args!("{line}")));
+    }
+    if health.is_some() {
+        tell.say(format_args!("{}", profile::line(profile.as_ref())));
     }
     if let Some(gripper) = &status.gripper {
         tell.say(format_args!(

@@ -113,7 +113,9 @@ fn known(options: &Calibrate, place: &Place<'_>, source: &mut Source) -> Result<
             calibrated: None,
         });
     }
-    let (path, kept) = profile_of(options.profile.as_deref(), &ids)?.map_err(none)?;
+    let (path, kept) = profile_of(options.profile.as_deref(), &ids)?.map_err(&none)?;
+    let fits = kept.bound.fits(&ids);
+    fits.map_err(|misfit| none(misfit.to_string()))?;
     Ok(Known {
         bound: kept.bound,
         place: path.display().to_string(),

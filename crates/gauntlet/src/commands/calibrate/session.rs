@@ -127,7 +127,7 @@ impl Session {
                     }
                     Key::Clutch | Key::Open => self.guide.go_on(self.source.now()),
                     Key::Again => self.guide.again(self.source.now()),
-                    Key::Calibrate => {}
+                    Key::Calibrate | Key::Undo => {}
                 }
             }
             if self.is_over() && (!drawn || self.by_itself) {

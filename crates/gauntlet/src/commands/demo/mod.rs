@@ -15,6 +15,7 @@ use crate::tell::Tell;
 use crate::{outputs, reading};
 use host::failure::Failure;
 use host::interrupt::Interrupt;
+use host::settings::Settings;
 use host::stats::seconds;
 use host::training::motion::Motion;
 use parts::{Stage, Started};
@@ -27,6 +28,8 @@ pub use args::Demo;
 /// A failure that says which of its steps did not succeed.
 pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
+    // Whose keys are not known is refused before anything is trained or moves.
+    Settings::load()?;
     if options.on_chip {
         on_chip::check(options)?;
     }

@@ -158,6 +158,7 @@ pub(super) fn worn(
     devices: &Virtual,
 ) -> (Run, Option<runs::Person>) {
     let Some((bound, person)) = profile else {
+        run.is_straight(true);
         return (run, None);
     };
     run.wears(Some(bound));

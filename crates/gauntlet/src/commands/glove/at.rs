@@ -8,7 +8,7 @@ use glove::hand::Side;
 
 use crate::commands::teleop::Hand as WhichHand;
 use crate::tell::Tell;
-use host::calibration::profile_of;
+use host::calibration::{may_be_ideal, profile_of};
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -109,10 +109,11 @@ impl GloveAt {
 
     /// The hand in it, by ideal sensors or by a profile; else why there is none.
     fn known(&self, scanning: &Scanning, tell: &Tell) -> Result<Result<Hand, String>> {
+        let ids = scanning.snapshot().map_or([None; 16], |seen| seen.ids());
         if self.ideal {
+            may_be_ideal(&self.glove, &ids)?;
             return Ok(Ok(Hand::ideal(self.side())));
         }
-        let ids = scanning.snapshot().map_or([None; 16], |seen| seen.ids());
         let (path, kept) = match profile_of(self.profile.as_deref(), &ids)? {
             Ok(found) => found,
             Err(why) => return Ok(Err(why)),

@@ -10,6 +10,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::glove::{GloveAt, Opened, take_flat};
+use super::teleop::Hand as WhichHand;
 use crate::options::run_time;
 use crate::outputs;
 use crate::results::{self, gloves, runs};
@@ -183,6 +184,15 @@ fn once_more(options: &Record) -> NextStep {
     if options.at.ideal {
         command = command.word("--ideal");
     }
+    // Where a profile says, it says so again.
+    match options.at.hand {
+        WhichHand::Left => command = command.option("--hand", "left"),
+        WhichHand::Right if options.at.ideal => command = command.option("--hand", "right"),
+        WhichHand::Right => {}
+    }
+    if let Some(time) = options.seconds {
+        command = command.option("--seconds", &time.as_secs_f64());
+    }
     if let Some(profile) = &options.at.profile {
         command = command.path("--profile", profile);
     }
@@ -242,4 +252,33 @@ fn lost_calibration(options: &Record) -> Failure {
         "the glove on {place} is no longer calibrated: the sensor of the hand, or two others, started anew"
     );
     Failure::new(what, once_more(options))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Typed {
+        #[command(flatten)]
+        record: Record,
+    }
+
+    #[test]
+    fn once_more_is_the_same_into_another_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let out = folder.path().join("hand.csv");
+        std::fs::write(&out, "").unwrap();
+        let words = "record --glove /dev/g --hand left --ideal --seconds 20.5 --out";
+        let typed = words.split(' ').chain(out.to_str());
+        let options = Typed::parse_from(typed).record;
+        let next = once_more(&options);
+        let again = next.commands().next().unwrap().words();
+        let again = Typed::parse_from(again.iter().skip(1)).record;
+        assert_eq!(again.out, folder.path().join("hand_2.csv"));
+        assert_eq!(again.at.glove, options.at.glove);
+        assert!(again.at.hand == WhichHand::Left && again.at.ideal);
+        assert_eq!(again.seconds, options.seconds);
+    }
 }

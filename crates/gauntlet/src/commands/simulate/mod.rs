@@ -20,7 +20,7 @@ use crate::progress::Person;
 use crate::say;
 use crate::wearer::{Wearer, ids};
 use devices::{Glove, Gripper};
-use host::calibration::profile_file::Quality;
+use host::calibration::profile_file::{MadeBy, Quality};
 use host::calibration::{Kept, ProfileStore};
 use host::clock::rfc3339;
 use host::interrupt::Interrupt;
@@ -96,13 +96,22 @@ fn keep_profile(
         Some(wearer) => {
             let done = wearer.calibrated(interrupt)?;
             let words = format!("of its person: {}", done.line());
-            (done.kept, words)
+            let kept = Kept {
+                made_by: MadeBy::Simulate,
+                ..done.kept
+            };
+            (kept, words)
         }
         None => (straight(glove), "of sensors that sit straight".to_owned()),
     };
-    let saved = ProfileStore::usual().and_then(|store| store.save(&kept));
+    let saved = ProfileStore::usual().and_then(|store| store.save_simulated(&kept));
     match saved {
-        Ok(path) => say!("profile  {}  {words}", path.display()),
+        Ok(Ok(path)) => say!("profile  {}  {words}", path.display()),
+        Ok(Err((path, other))) => say!(
+            "profile  {}  of {} stays: gauntlet calibrate made it for this person",
+            path.display(),
+            other.calibrated
+        ),
         Err(failure) => {
             say!("warning: the glove's profile is not kept: {failure}");
             say!("  try: {}", failure.next_step());
@@ -127,5 +136,6 @@ fn straight(glove: &VirtualGlove) -> Kept {
             heading_deg: 0.0,
             findings: Vec::new(),
         },
+        made_by: MadeBy::Simulate,
     }
 }

@@ -17,6 +17,15 @@ pub enum Hand {
     Left,
 }
 
+/// Whether something is done.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Switch {
+    /// It is.
+    On,
+    /// It is not.
+    Off,
+}
+
 /// Options of `teleop`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -25,9 +34,9 @@ Examples:
   gauntlet teleop --glove /tmp/glove --gripper /tmp/gripper --model model.safetensors --calibrate-flat --engage --activate --seconds 10
 
 The glove's profile (`gauntlet calibrate`) is found by its sensors' ids; after each power-on of the glove one flat pose \
-gives the headings: `--calibrate-flat`, or the key c. Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
+gives the headings: `--calibrate-flat`, or the key c; u takes it back. Nothing moves at start. The gripper follows while the clutch is closed: the space bar closes and opens it, \
 `--engage` closes it from the start. A gripper that is not activated is activated only by `--activate` or \
-by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends.")]
+by a typed yes: activation moves the fingers. q or Ctrl-C holds the gripper where it is and ends. `gauntlet settings` binds other keys.")]
 pub struct Teleop {
     /// The glove's serial port, or `i2c:/dev/i2c-N`.
     #[arg(long, value_name = "PORT")]
@@ -59,6 +68,9 @@ pub struct Teleop {
     /// Take the flat hand before the clutch may close: waits up to 30 s until it lies still.
     #[arg(long)]
     pub calibrate_flat: bool,
+    /// Whether flat poses are found while the hand works, and correct what has drifted.
+    #[arg(long, value_enum, value_name = "ON|OFF", default_value_t = Switch::On)]
+    pub find_flat: Switch,
     /// How the gripper's line differs from that of a gripper as delivered.
     #[command(flatten)]
     pub line: LineOptions,

@@ -11,8 +11,8 @@ use gripper::Activation;
 use super::args::Teleop;
 use crate::run::Run;
 use crate::tell::Tell;
-use host::calibration::profile_of;
 use host::calibration::virtual_person::VirtualPerson;
+use host::calibration::{may_be_ideal, profile_of};
 use host::diagnose;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -60,9 +60,7 @@ pub(super) fn prepare(
         return Ok(Prepared::NoFrames);
     }
     tell_missing(run, tell)?;
-    if !options.ideal {
-        find_profile(options, run, tell)?;
-    }
+    find_profile(options, run, tell)?;
     if options.calibrate_flat && !run.calibrate(tell)? {
         return Ok(Prepared::Ended);
     }
@@ -104,6 +102,11 @@ fn find_profile(options: &Teleop, run: &mut Run, tell: &Tell) -> Result<()> {
     let ids = run
         .snapshot()
         .map_or([None; SEGMENT_COUNT], |seen| seen.ids);
+    if options.ideal {
+        may_be_ideal(&options.glove, &ids)?;
+        run.is_straight(true);
+        return Ok(());
+    }
     let why = match profile_of(options.profile.as_deref(), &ids)? {
         Ok((path, kept)) => {
             tell.say(format_args!(

@@ -28,7 +28,7 @@ use host::words;
 
 use bringup::{Prepared, no_frames, prepare};
 
-pub use args::{Hand, Teleop};
+pub use args::{Hand, Switch, Teleop};
 
 /// Runs until its time is over or somebody ends it.
 ///
@@ -97,6 +97,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         settings: line,
     };
     let mut run = Run::new(session, log, clock, interrupt.clone(), devices);
+    run.finds_flat(options.find_flat == Switch::On)?;
     run.has(VirtualPerson::at(&options.glove).map(Listener::There));
     let prepared = prepare(options, &mut run, &tell, activation);
     let frames = !matches!(prepared, Ok(Prepared::NoFrames));

@@ -25,6 +25,10 @@ impl Sensor {
     ) -> bool {
         self.tries = 0;
         self.forget();
+        (self.is_doubtful, self.answered) = (false, now);
+        if step.reads_id() && outcome.next != Some(Step::Identify) {
+            self.is_identified = outcome.unique_id.is_some();
+        }
         self.due = after(now, outcome.pause);
         self.step = outcome.next;
         self.pointer_stays = outcome.pointer_stays.unwrap_or(self.pointer_stays);
@@ -51,6 +55,7 @@ impl Sensor {
     /// A step failed; true when its bring-up starts over.
     pub fn step_failed(&mut self, step: Step, error: Error, now: Instant) -> bool {
         self.forget();
+        self.is_doubtful = false;
         self.note(error, now);
         if let Error::Bus { cause, .. } | Error::Mux(cause) = error
             && !is_sensors(cause)

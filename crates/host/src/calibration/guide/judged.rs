@@ -6,7 +6,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES, Side};
 use glove::imu::UniqueId;
 use serde::Serialize;
 
-use super::super::profile_file::{Kept, Quality};
+use super::super::profile_file::{Kept, MadeBy, Quality};
 use super::super::report::word;
 
 /// The outcome of a session, judged.
@@ -314,6 +314,7 @@ impl Judged {
             },
             calibrated,
             quality: self.quality(),
+            made_by: MadeBy::Calibrate,
         }
     }
 }

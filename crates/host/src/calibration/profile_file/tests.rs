@@ -36,6 +36,10 @@ pub(crate) fn kept(glove: u8) -> Kept {
             heading_deg: 3.0,
             findings: vec!["a \"finding\" with a \\ and a\nnew line".to_owned()],
         },
+        made_by: match glove % 2 {
+            0 => MadeBy::Simulate,
+            _ => MadeBy::Calibrate,
+        },
     }
 }
 
