@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use crate::options::{DrivingOptions, LineOptions, model_parser, run_time};
+use crate::options::{DrivingOptions, LineOptions, ReadingOptions, model_parser, run_time};
 use host::lines::Model;
 
 /// Which hand wears the glove.
@@ -59,6 +59,9 @@ pub struct Teleop {
     /// Take the flat hand before the clutch may close: waits up to 30 s until it lies still.
     #[arg(long)]
     pub calibrate_flat: bool,
+    /// How the glove is read.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// How the gripper's line differs from that of a gripper as delivered.
     #[command(flatten)]
     pub line: LineOptions,
