@@ -42,9 +42,9 @@ pub trait Chip: Board<AXES> {
 pub struct Devices<C: Chip> {
     /// The host protocol's line.
     pub host: C::Host,
-    /// The bus of the glove's sensors: [`glove::sc18im::Sc18im`] on the port of its serial multiplexer, at 115,200 baud for good. A
-    /// board whose port can change its speed ([`glove::sc18im::SetBaud`]) gives it `with_set_baud` and says how fast in
-    /// [`glove::sc18im::Config::raise_to`]; a glove whose power was cut is then found again.
+    /// The bus of the glove's sensors: [`glove::sc18im::Sc18im`] on the port of its serial multiplexer. A board whose port can change
+    /// its speed ([`glove::sc18im::SetBaud`]) gives it `with_set_baud` and says how fast in [`glove::sc18im::Config::raise_to`]: a
+    /// glove fresh from power-on is then found, and found again after a power cut. Elsewhere it must speak the port's speed.
     pub glove: C::Glove,
     /// The gripper's Modbus RTU line.
     pub gripper: C::Line,

@@ -14,7 +14,6 @@ use gripper::Activation;
 use host::chip::emulator::{Emulator, Setup};
 use host::chip::link::{Address, Error, Heartbeat, HostLink};
 use host::interrupt::Interrupt;
-use host::probe;
 use host::realtime;
 use rig::Device;
 use rig::glove::VirtualGlove;
@@ -196,8 +195,7 @@ impl Loop {
             spawn(Box::new(glove.clone())),
             spawn(Box::new(gripper.clone())),
         ];
-        // Fresh from power-on it speaks 9,600 baud, and the emulated line 115,200.
-        drop(probe::open_glove(ports[0].path(), &never).expect("a glove"));
+        // Fresh from power-on it speaks 9,600 baud: the bridge finds it there.
         let mut emulator = Emulator::new(Setup {
             firmware: firmware.to_owned(),
             glove: Some(ports[0].path().to_owned()),
@@ -252,6 +250,26 @@ impl Loop {
         // The profile outlived it.
         take_flat(&mut self.link, &self.glove);
         true
+    }
+
+    /// Cuts the glove's power for a moment, and waits until the bridge has found it again at the speed of its power-on. Its headings
+    /// are new: one flat pose more.
+    ///
+    /// # Panics
+    /// It does not come back.
+    pub fn cut_glove_power(&mut self) {
+        let now = || self.ports[0].clock().now();
+        self.glove.power(false, now());
+        wait_for(&mut self.link, "a glove that is gone", |link| {
+            !link.status().expect("an answer").glove_answers
+        });
+        self.glove.power(true, now());
+        wait_for(&mut self.link, "the glove, back", |link| {
+            link.status().expect("an answer").glove_answers
+        });
+        let health = self.link.health().expect("an answer");
+        assert!(!health.calibration.is_calibrated, "its headings are others");
+        take_flat(&mut self.link, &self.glove);
     }
 
     /// Whether the bridge still knows the session.

@@ -47,10 +47,12 @@ fn kept_waiting<T>(work: impl FnOnce() -> T) -> (T, Duration) {
 /// One stretch without a hold is enough. Where none is, that is the loop's fault, but where this machine was seen to be busy
 /// in every one of them; and a chip that answered nothing at all is never excused.
 #[test]
-fn every_fresh_glove_frame_is_answered_and_no_byte_is_lost_in_the_queues() {
+fn every_fresh_glove_frame_is_answered_no_byte_is_lost_and_a_glove_whose_power_was_cut_comes_back()
+{
     let Some(firmware) = firmware() else { return };
     let _alone = alone();
     let mut whole = Loop::start(&firmware);
+    whole.cut_glove_power();
     let mut seen = Vec::new();
     for _ in 0..STRETCHES {
         let (stretch, waited) = kept_waiting(|| whole.follow(Duration::from_secs(10)));

@@ -6,7 +6,7 @@ use crate::setup::{self, EMULATOR, Thing};
 use crate::step::{self, Failure};
 use crate::{surprises, thumb};
 use std::fs::DirBuilder;
-use std::os::unix::fs::DirBuilderExt;
+use std::os::unix::fs::{DirBuilderExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
@@ -140,6 +140,13 @@ pub fn emulate(options: &[&str]) -> Result<(), Failure> {
             }
         };
         qemu.args(["-chardev", &backend, "-serial", &format!("chardev:{name}")]);
+    }
+    if let Some(glove) = devices[0]
+        && let Ok(glove) = std::path::absolute(glove)
+    {
+        // Whoever speaks to the bridge asks the virtual person in its glove, where there is one.
+        let person = |path: &str| format!("{path}.person");
+        let _ = symlink(person(&glove.display().to_string()), person(&at("host")));
     }
     println!(
         "weights flash: {} (kept until you remove it); Ctrl-C ends",

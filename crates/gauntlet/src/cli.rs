@@ -136,6 +136,7 @@ impl Cli {
 /// The settings file is wrong; only for verbs that use it.
 pub fn parse(typed: &[OsString]) -> Result<Cli> {
     let mut command = Cli::command();
+    let typed = &preferred::whole(typed);
     if preferred::uses(typed) {
         command = preferred::with(command, &host::settings::Settings::load()?, typed);
     }

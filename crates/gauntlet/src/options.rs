@@ -6,7 +6,9 @@ use std::time::Duration;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
+use glove::imu;
 use host::failure::Failure;
+use host::lines::glove::{RAISED, Reading};
 use host::lines::{Model, Settings};
 use host::session::Driving;
 
@@ -43,6 +45,74 @@ impl LineOptions {
             patience: self.patience,
         }
     }
+}
+
+/// How the glove is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Args)]
+pub struct ReadingOptions {
+    /// Highest speed of the glove's serial line: it is raised to the highest up to this one that answers without errors.
+    #[arg(long, value_name = "BAUD", value_parser = raised(), default_value_t = Reading::default().baud)]
+    pub glove_baud: u32,
+    /// Whether the glove's serial bridge is asked after each read how it went.
+    #[arg(long, value_enum, value_name = "WHETHER", default_value_t = OnOff::On)]
+    pub status_check: OnOff,
+    /// Which fusion the glove's sensors run: ndof has a compass, and is worse near metal.
+    #[arg(long, value_enum, value_name = "MODE", default_value_t = SensorMode::Imu)]
+    pub sensor_mode: SensorMode,
+}
+
+/// On or off: an option that can say both wins over a settings file that says either.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum OnOff {
+    /// It is so.
+    On,
+    /// It is not.
+    Off,
+}
+
+/// Which fusion the sensors run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum SensorMode {
+    /// Accelerometer and gyroscope.
+    Imu,
+    /// All nine axes.
+    Ndof,
+}
+
+impl Default for ReadingOptions {
+    fn default() -> Self {
+        Self {
+            glove_baud: Reading::default().baud,
+            status_check: OnOff::On,
+            sensor_mode: SensorMode::Imu,
+        }
+    }
+}
+
+impl ReadingOptions {
+    /// The same for whoever reads it.
+    pub fn given(&self) -> Reading {
+        Reading {
+            baud: self.glove_baud,
+            status_checks: self.status_check == OnOff::On,
+            mode: match self.sensor_mode {
+                SensorMode::Imu => imu::Mode::Imu,
+                SensorMode::Ndof => imu::Mode::Ndof,
+            },
+        }
+    }
+}
+
+/// Takes one of the speeds a glove's line may be raised to.
+fn raised() -> clap::builder::ValueParser {
+    let one = |text: &str| match text.parse::<u32>() {
+        Ok(baud) if RAISED.contains(&baud) => Ok(baud),
+        _ => Err(format!(
+            "one of {}",
+            RAISED.map(|baud| baud.to_string()).join(", ")
+        )),
+    };
+    clap::builder::ValueParser::new(one)
 }
 
 /// How the gripper is driven, where that is not as usual.

@@ -335,12 +335,14 @@ impl Run {
 
     /// Holds the gripper, ends the session, finishes the log and sums up. Always: what failed is part of what is left.
     pub fn finish(mut self) -> Finished {
+        let seen = self.session.snapshot();
         let stopped = self.session.stop();
         let log = self.log.take().map(SessionLog::finish);
         Finished {
             summary: self.session.hub().summary(),
             log,
             stopped,
+            seen,
             ending: self.ending,
             activated: self.activated,
             devices: self.devices,

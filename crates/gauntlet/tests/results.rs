@@ -13,7 +13,9 @@ use bridge::protocol::message::{
     Counters, GripperStatus, Health, Hello, PerAxis, Restart, SlotContents, Slots, Status,
     WeightsKind,
 };
-use gauntlet::results::{calibrations, devices, gloves, maps, named, paper, runs, settings};
+use gauntlet::results::{
+    calibrations, devices, gloves, headings, maps, named, paper, runs, settings,
+};
 use gripper::{Activation, Fault};
 use host::calibration::guide::{Check, Finding as Found, Joint};
 use host::calibration::profile_file::Quality as Grade;
@@ -195,6 +197,8 @@ fn results_of_runs_keep_their_names() {
     let run = || runs::Run {
         gripper: Some(Stopped::Held),
         run: &summary,
+        glove_baud: Some(460_800),
+        joints: Some(joints()),
         log: Some(&log),
         poses: Some(runs::Poses {
             path: path("hand.csv"),
@@ -210,6 +214,7 @@ fn results_of_runs_keep_their_names() {
         quality: &quality,
         person: Some(&person),
         flash: Some(&flashed),
+        first_motion_from_start_s: Some(9.6),
         run: run(),
     };
     golden(
@@ -417,6 +422,7 @@ fn results_of_gloves_keep_their_names() {
         took_s: 10.0,
         calibrated: true,
         scanned: scanned(),
+        joints: Some(joints()),
         sensors: vec![sensor],
         found: vec!["the sensor on hand is frozen".to_owned()],
         failure: Some(Told::of(&error)),
@@ -653,4 +659,20 @@ fn calibrations_and_settings() {
             sample("settings", preferred),
         ],
     );
+}
+
+fn joints() -> Vec<headings::Joint> {
+    let unknown = headings::Joint {
+        segment: "little_distal",
+        heading: "unknown",
+        sigma_deg: None,
+        drift_deg_per_min: 0.0,
+    };
+    let sure = headings::Joint {
+        segment: "index_proximal",
+        heading: "sure",
+        sigma_deg: Some(1.4),
+        drift_deg_per_min: -0.3,
+    };
+    vec![sure, unknown]
 }

@@ -27,7 +27,7 @@ mod speed;
 pub use blocking::Blocking;
 pub use command::{baud_divisor, register};
 pub use config::{Config, Counters};
-pub use speed::{BaudRefused, LOSSES_MAX, RAISE_TRIES, RESET_BAUD, SPEEDS, SetBaud, TRIAL};
+pub use speed::{BaudRefused, FLOOR, LOSSES_MAX, RAISE_TRIES, RESET_BAUD, SPEEDS, SetBaud, TRIAL};
 
 /// A serial port that does not block: `read_ready` before `read`, and writes that go to a queue.
 pub trait SerialPort: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write {}

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use host::clock::Clock;
 use host::interrupt::Interrupt;
+use host::lines::glove::Reading;
 use host::lines::{Model, Settings};
 use host::probe;
 use host::report::Nobody;
@@ -21,6 +22,7 @@ fn main() -> anyhow::Result<()> {
     let (gripper, _) = probe::open_gripper(Path::new(gripper), model, &Nobody, &interrupt)?;
     let parts = Parts {
         glove: probe::open_glove(Path::new(glove), &interrupt)?.port.into(),
+        reading: Reading::default(),
         gripper,
         model,
         line: Settings::default(),

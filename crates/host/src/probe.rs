@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use embedded_io::{Read, ReadReady, Write};
+use glove::sc18im::{RESET_BAUD, SetBaud as _};
 use gripper::driver::{Driver, Family, ThreeFinger, TwoFinger};
 use gripper::registers::Kind;
 use gripper::{Activation, Event, Gripper};
@@ -19,10 +20,27 @@ use crate::lines::port::{BAUD, Port};
 use crate::lines::{Line, Model, Settings, tcp};
 use crate::report::Reporter;
 
-/// The SC18IM's speed after a reset.
-const RESET_BAUD: u32 = 9_600;
-/// The other speeds it may speak, likeliest first: after power-on, and where a faster session left it.
-const OTHER_BAUDS: [u32; 3] = [RESET_BAUD, 460_800, 230_400];
+/// What comes before a speed is tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Quiet {
+    /// Nothing: what was asked at the speeds before cannot be taken for a command. To a slower receiver three bytes are one byte with
+    /// its upper bits set; a faster one sees each bit four times.
+    None,
+    /// As long as the chip takes to forget half a command.
+    IdleTimeout,
+}
+
+/// The speeds at which the multiplexer is looked for: as it was set, as a faster session left it, as after power-on; then each again,
+/// when it has forgotten whatever it was told.
+const TRIES: [(u32, Quiet); 7] = [
+    (BAUD, Quiet::None),
+    (460_800, Quiet::None),
+    (RESET_BAUD, Quiet::None),
+    (BAUD, Quiet::IdleTimeout),
+    (RESET_BAUD, Quiet::IdleTimeout),
+    (460_800, Quiet::IdleTimeout),
+    (230_400, Quiet::IdleTimeout),
+];
 /// Read the register I2CStat (0A): `R 0A P`. Answered by one byte, F0 to F8, whatever hangs on the bus.
 const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
 /// Write BRG0 = 30, BRG1 = 00: 7372800 / 115200 − 16 = 0x0030. Works as soon as BRG1 is there.
@@ -41,10 +59,10 @@ const LOOK: Duration = Duration::from_millis(1);
 /// A glove that answers.
 #[derive(Debug)]
 pub struct Glove {
-    /// Its port, at 115200 baud.
+    /// Its port, at the speed of the serial multiplexer: 115200 baud or more.
     pub port: Port,
-    /// The speed it spoke where it was another, and was switched: 9600 baud, as after power-on, or what a program left it at.
-    pub switched: Option<u32>,
+    /// The speed it spoke: 9600 baud, as after power-on (it was switched to 115200 then), or what a program left it at.
+    pub found: u32,
 }
 
 /// A glove that answers, whichever way leads to it.
@@ -52,8 +70,8 @@ pub struct Glove {
 pub struct GloveFound {
     /// The way to it.
     pub line: GloveLine,
-    /// As [`Glove::switched`].
-    pub switched: Option<u32>,
+    /// As [`Glove::found`]; `None` on an I²C port.
+    pub found: Option<u32>,
 }
 
 /// Opens the way to a glove: a serial port as [`open_glove`] does, or `i2c:/dev/i2c-N`, where its multiplexer is asked.
@@ -66,78 +84,68 @@ pub fn open_glove_line(path: &Path, interrupt: &Interrupt) -> Result<GloveFound>
         diagnose::multiplexer_answers(&address, &mut port, interrupt)?;
         return Ok(GloveFound {
             line: GloveLine::I2c(port),
-            switched: None,
+            found: None,
         });
     }
-    let Glove { port, switched } = open_glove(path, interrupt)?;
+    let Glove { port, found } = open_glove(path, interrupt)?;
     Ok(GloveFound {
         line: port.into(),
-        switched,
+        found: Some(found),
     })
 }
 
-/// Opens the glove's port and finds its serial multiplexer: at 115200 baud, or, fresh from power-on, at 9600, or where a faster
-/// session left it; from there it is switched to 115200.
+/// Opens the glove's port and finds its serial multiplexer: at 115200 baud, where a faster session left it, or, fresh from power-on, at
+/// 9600; from there it is switched to 115200. One that speaks faster stays there: the reading lowers or raises it.
 ///
 /// # Errors
 /// A failure that says whether the port does not open or nobody answers on it, and what to try.
 pub fn open_glove(path: &Path, interrupt: &Interrupt) -> Result<Glove> {
     let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
-    if answers(&mut port, interrupt) {
-        diagnose::keeps_registers(path, &mut port, interrupt)?;
-        return Ok(Glove {
-            port,
-            switched: None,
-        });
-    }
-    drop(port);
-    for baud in OTHER_BAUDS {
-        if let Some(mut port) = switched_from(baud, path, interrupt)? {
+    for (baud, after) in TRIES {
+        if after == Quiet::IdleTimeout && interrupt.sleep(IDLE) {
+            break;
+        }
+        if let Some(found) = found_at(baud, &mut port, interrupt) {
             diagnose::keeps_registers(path, &mut port, interrupt)?;
-            return Ok(Glove {
-                port,
-                switched: Some(baud),
-            });
+            return Ok(Glove { port, found });
         }
     }
     if interrupt.asked() {
         return Err(Failure::interrupted("while the glove was looked for").into());
     }
-    let [reset, high, low] = OTHER_BAUDS;
+    drop(port);
     let what = format!(
-        "no glove answers on {}, asked for its serial multiplexer (SC18IM) at {BAUD}, {reset}, {high} and {low} baud",
-        path.display()
+        "no glove answers on {}, asked for its serial multiplexer (SC18IM) at {BAUD}, {RESET_BAUD}, 460800 and 230400 baud",
+        path.display(),
     );
     Err(diagnose::no_glove(&what, path, interrupt).into())
 }
 
-/// The glove's port at 115200 baud, if the multiplexer answers at `baud` and then there.
-fn switched_from(baud: u32, path: &Path, interrupt: &Interrupt) -> Result<Option<Port>> {
-    if baud != RESET_BAUD && interrupt.sleep(IDLE) {
-        // What was asked at the speeds before reached it as half a command.
-        return Ok(None);
-    }
-    let mut port = Port::open(path, baud).map_err(Failure::from)?;
+/// The speed of the multiplexer, if it answers at `baud`, and, where that is slower, then at 115200, which the port is then set to.
+fn found_at(baud: u32, port: &mut Port, interrupt: &Interrupt) -> Option<u32> {
+    // What the adapter cannot make, nobody asks at.
+    port.set_baud(baud).ok()?;
+    let first = status_byte(port, interrupt);
     // Noise may look like it once.
-    let there = status_byte(&mut port, interrupt)
-        && (baud == RESET_BAUD || status_byte(&mut port, interrupt));
-    if !there || port.write(&SET_BAUD) != Ok(SET_BAUD.len()) {
-        return Ok(None);
+    let there = match baud {
+        BAUD => first || status_byte(port, interrupt),
+        _ => first && status_byte(port, interrupt),
+    };
+    if !there {
+        return None;
+    }
+    if baud >= BAUD {
+        return Some(baud);
+    }
+    if port.write(&SET_BAUD) != Ok(SET_BAUD.len()) {
+        return None;
     }
     // All six bytes must have left at the old speed: 6.3 ms at 9600 baud.
     interrupt.sleep(2 * SPEED_WAIT);
-    drop(port);
-    let mut port = Port::open(path, BAUD).map_err(Failure::from)?;
+    port.set_baud(BAUD).ok()?;
     interrupt.sleep(SPEED_WAIT);
-    Ok(answers(&mut port, interrupt).then_some(port))
-}
-
-/// Twice at once, and once more after the time in which a cut-off command is forgotten.
-fn answers(port: &mut Port, interrupt: &Interrupt) -> bool {
-    if status_byte(port, interrupt) || status_byte(port, interrupt) {
-        return true;
-    }
-    !interrupt.sleep(IDLE) && status_byte(port, interrupt)
+    let there = status_byte(port, interrupt) || status_byte(port, interrupt);
+    (there || !interrupt.sleep(IDLE) && status_byte(port, interrupt)).then_some(baud)
 }
 
 fn status_byte(port: &mut Port, interrupt: &Interrupt) -> bool {

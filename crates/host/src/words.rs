@@ -17,6 +17,14 @@ pub fn axis_words(axes: usize) -> &'static [&'static str] {
     }
 }
 
+/// The speed of a glove's line, baud; `None` on an I²C port.
+pub fn line_speed(baud: Option<u32>) -> String {
+    match baud {
+        Some(baud) => format!("{baud} baud"),
+        None => "on an I2C port".to_owned(),
+    }
+}
+
 /// The fingers, thumb first: each has five joint angles in a row.
 pub const FINGER_NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 

@@ -4,6 +4,7 @@
 //! dropped. Queues are used only inside critical sections, so they are never borrowed twice; the borrows are tried all the
 //! same, so that no panic is linked.
 
+use bridge::glove::sc18im::{BaudRefused, SetBaud};
 use core::cell::{Cell, RefCell};
 use critical_section::{CriticalSection, Mutex};
 use heapless::Deque;
@@ -27,6 +28,8 @@ const INTERRUPT_TRANSMIT: u32 = 1 << 0;
 const INTERRUPT_RECEIVE: u32 = 1 << 1;
 
 const BAUD: u32 = 115_200;
+/// Least value of the divider (Arm DDI 0479, chapter 4.3).
+const SMALLEST_DIVIDER: u32 = 16;
 
 /// Which line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -173,6 +176,24 @@ impl Port {
         uart.write(BAUD_DIVIDER, super::CLOCK_HZ / BAUD);
         uart.write(CONTROL, CONTROL_ALL);
         Some(Self { uart })
+    }
+}
+
+impl SetBaud for Port {
+    /// What is queued goes out at the new speed: the caller waits until it has left. What came at the old one is thrown away.
+    fn set_baud(&mut self, baud: u32) -> Result<(), BaudRefused> {
+        let divider = super::CLOCK_HZ / baud.max(1);
+        // The receiver samples each bit at one of 16 ticks of the divider.
+        if divider < SMALLEST_DIVIDER {
+            return Err(BaudRefused::Unsupported(baud));
+        }
+        critical_section::with(|section| {
+            self.uart.write(BAUD_DIVIDER, divider);
+            if let Ok(mut received) = self.uart.line(section).received.try_borrow_mut() {
+                received.clear();
+            }
+        });
+        Ok(())
     }
 }
 

@@ -5,55 +5,80 @@ use std::ffi::OsString;
 use clap::{Arg, ArgAction};
 use host::settings::Settings;
 
-/// The setting behind an option.
-const BEHIND: [(&str, &str); 13] = [
-    ("glove", "glove.port"),
-    ("hand", "glove.hand"),
-    ("gripper", "gripper.port"),
-    ("gripper-model", "gripper.model"),
-    ("unit", "gripper.unit"),
-    ("baud", "gripper.baud"),
-    ("patience", "gripper.patience_ms"),
-    ("speed", "gripper.speed"),
-    ("force", "gripper.force"),
-    ("rate", "gripper.rate"),
-    ("safe-action", "gripper.safe_action"),
-    ("model", "teleop.model"),
-    ("find-flat", "teleop.find_flat"),
+/// An option, the setting behind it, and the verbs that have it from there.
+type Behind = (&'static str, &'static str, &'static [&'static str]);
+
+/// The verbs that read a glove at a port.
+const GLOVES: &[&str] = &["teleop", "calibrate", "record", "glove", "doctor"];
+/// The same, and that of the virtual one.
+const READ: &[&str] = &["teleop", "calibrate", "record", "glove", "doctor", "demo"];
+/// The verbs that talk to a gripper at a port.
+const GRIPPERS: &[&str] = &["teleop", "gripper", "doctor"];
+/// The verbs for which it matters what moves.
+const MODELS: &[&str] = &["teleop", "gripper", "doctor", "train", "demo", "simulate"];
+
+const BEHIND: &[Behind] = &[
+    ("glove", "glove.port", GLOVES),
+    ("glove-baud", "glove.baud", READ),
+    ("status-check", "glove.status_check", READ),
+    ("sensor-mode", "glove.mode", READ),
+    (
+        "hand",
+        "glove.hand",
+        &["teleop", "calibrate", "record", "glove"],
+    ),
+    ("gripper", "gripper.port", GRIPPERS),
+    ("gripper-model", "gripper.model", MODELS),
+    ("unit", "gripper.unit", GRIPPERS),
+    ("baud", "gripper.baud", GRIPPERS),
+    ("patience", "gripper.patience_ms", GRIPPERS),
+    ("speed", "gripper.speed", &["teleop", "gripper"]),
+    ("force", "gripper.force", &["teleop", "gripper"]),
+    ("rate", "gripper.rate", &["teleop"]),
+    ("safe-action", "gripper.safe_action", &["teleop"]),
+    ("bridge", "bridge.port", &["bridge", "flash"]),
+    ("model", "teleop.model", &["teleop", "eval"]),
+    ("find-flat", "teleop.find_flat", &["teleop"]),
 ];
 
-/// The verbs whose options they are: those that talk to devices at real ports.
-const VERBS: [&str; 6] = [
-    "teleop",
-    "calibrate",
-    "record",
-    "glove",
-    "gripper",
-    "doctor",
-];
+/// What `gauntlet` alone does.
+const ALONE: &str = "demo";
+
+/// The command line with the verb that it stands for.
+pub fn whole(words: &[OsString]) -> Vec<OsString> {
+    let mut words = words.to_vec();
+    if words.len() == 1 {
+        words.push(ALONE.into());
+    }
+    words
+}
 
 /// Whether a command line uses settings.
 pub fn uses(words: &[OsString]) -> bool {
     let verb = words.get(1).and_then(|word| word.to_str());
-    verb.is_some_and(|verb| VERBS.contains(&verb))
-        && !words.iter().any(|word| word == "--help" || word == "-h")
+    let has = |verb: &str| BEHIND.iter().any(|(_, _, verbs)| verbs.contains(&verb));
+    verb.is_some_and(has) && !words.iter().any(|word| word == "--help" || word == "-h")
 }
 
 /// The command line `command` with the settings as its defaults, for what was typed.
 pub fn with(mut command: clap::Command, settings: &Settings, typed: &[OsString]) -> clap::Command {
-    for verb in VERBS {
-        command = command.mut_subcommand(verb, |verb| below(verb, settings, typed));
+    let verbs: Vec<String> = command
+        .get_subcommands()
+        .map(|verb| verb.get_name().to_owned())
+        .collect();
+    for verb in &verbs {
+        let typed = Typed { verb, words: typed };
+        command = command.mut_subcommand(verb, |command| below(command, settings, typed));
     }
     command
 }
 
-fn below(command: clap::Command, settings: &Settings, typed: &[OsString]) -> clap::Command {
+fn below(command: clap::Command, settings: &Settings, typed: Typed<'_>) -> clap::Command {
     let names: Vec<String> = command
         .get_subcommands()
         .map(|sub| sub.get_name().to_owned())
         .collect();
-    let doctor = command.get_name() == "doctor";
-    let mut command = command.mut_args(|arg| match preferred(&arg, settings, typed, doctor) {
+    let mut command = command.mut_args(|arg| match preferred(&arg, settings, typed) {
         Some(value) => arg.default_value(value).required(false),
         None => arg,
     });
@@ -63,37 +88,53 @@ fn below(command: clap::Command, settings: &Settings, typed: &[OsString]) -> cla
     command
 }
 
+/// What was typed, as a verb sees it.
+#[derive(Debug, Clone, Copy)]
+struct Typed<'a> {
+    verb: &'a str,
+    words: &'a [OsString],
+}
+
+impl Typed<'_> {
+    /// Whether an option stands in it.
+    fn names(&self, option: &str) -> bool {
+        self.words.iter().any(|word| {
+            let word = word.to_string_lossy();
+            word == option || word.starts_with(&format!("{option}="))
+        })
+    }
+}
+
 /// What the file gives for an option of these words.
-fn preferred(arg: &Arg, settings: &Settings, typed: &[OsString], doctor: bool) -> Option<String> {
+fn preferred(arg: &Arg, settings: &Settings, typed: Typed<'_>) -> Option<String> {
     let long = arg.get_long()?;
     // A flag takes no value; what a positional word means is the verb's own.
     if !matches!(arg.get_action(), ArgAction::Set) {
         return None;
     }
-    let (_, key) = BEHIND.iter().find(|(option, _)| *option == long)?;
-    let named = |option: &str| {
-        let is = |word: &OsString| {
-            let word = word.to_string_lossy();
-            word == option || word.starts_with(&format!("{option}="))
-        };
-        typed.iter().any(is)
-    };
-    // Who names one device to `doctor` asks about that one alone; about a named gripper's family it is asked to find out.
-    if doctor && (named("--glove") || named("--gripper")) && matches!(long, "glove" | "gripper") {
-        return None;
-    }
-    let gripper_is_there = settings.given("gripper.port").is_some() || named("--gripper");
-    if doctor && !gripper_is_there && long == "gripper-model" {
-        return None;
-    }
-    // Unit and speed of a serial line are none of one on the network, and the other way round.
-    if matches!(long, "unit" | "baud") && named("--gripper") {
-        let network = typed
-            .iter()
-            .any(|word| word.to_string_lossy().contains("tcp:"));
-        if network != settings.is_network() {
+    let behind = |(option, _, verbs): &&Behind| *option == long && verbs.contains(&typed.verb);
+    let (_, key, _) = BEHIND.iter().find(behind)?;
+    let gripper = typed.names("--gripper");
+    match (typed.verb, long) {
+        // Who names one device asks about that one alone.
+        ("doctor", "glove" | "gripper") if typed.names("--glove") || gripper => return None,
+        // About a named gripper's family it is asked to find out.
+        ("doctor", "gripper-model") if settings.given("gripper.port").is_none() && !gripper => {
             return None;
         }
+        // There is no gripper then.
+        ("simulate", "gripper-model") if typed.names("--glove") && !gripper => return None,
+        // The firmware is for one gripper.
+        ("demo", "gripper-model") if typed.names("--on-chip") => return None,
+        // Unit and speed of a serial line are none of one on the network, and the other way round.
+        (_, "unit" | "baud") if gripper => {
+            let mut words = typed.words.iter();
+            let network = words.any(|word| word.to_string_lossy().contains("tcp:"));
+            if network != settings.is_network() {
+                return None;
+            }
+        }
+        _ => {}
     }
     Some(settings.given(key)?.to_string())
 }
@@ -182,6 +223,212 @@ model = \"mine.safetensors\"
             panic!("simulate");
         };
         assert_eq!((simulate.glove, simulate.gripper), (None, None));
+        let pair = Some(host::lines::Model::TwoFinger85);
+        assert_eq!(simulate.gripper_model, pair, "as teleop expects it");
+        for alone in [
+            "--glove /tmp/g",
+            "--gripper-model 3f --glove /tmp/g --gripper /tmp/r",
+        ] {
+            let Verb::Simulate(simulate) =
+                parse(FILE, &format!("gauntlet simulate {alone}")).unwrap()
+            else {
+                panic!("simulate");
+            };
+            assert_ne!(simulate.gripper_model, pair, "{alone}");
+        }
+    }
+
+    #[test]
+    fn gauntlet_alone_is_the_demo_with_this_person_s_settings() {
+        let typed = whole(&["gauntlet".into()]);
+        assert_eq!(typed, ["gauntlet", "demo"]);
+        let Verb::Demo(demo) = parse(FILE, "gauntlet demo").unwrap() else {
+            panic!("demo");
+        };
+        assert_eq!(demo.gripper_model, host::lines::Model::TwoFinger85);
+        let Verb::Demo(demo) = parse(FILE, "gauntlet demo --on-chip").unwrap() else {
+            panic!("demo");
+        };
+        assert_eq!(demo.gripper_model, host::lines::Model::ThreeFinger);
+    }
+
+    /// Options that mean another thing than the setting of their name, or that a setting would only harm.
+    const OTHERS: &[(&str, &str, &str)] = &[
+        ("train", "rate", "the learning rate"),
+        (
+            "simulate",
+            "glove",
+            "where a virtual one is made, never a real port",
+        ),
+        (
+            "simulate",
+            "gripper",
+            "where a virtual one is made, never a real port",
+        ),
+        (
+            "calibrate",
+            "bridge",
+            "a glove at a port is meant where nothing is said",
+        ),
+    ];
+
+    /// Options that are nobody's preference: what a run is about, or how it is told.
+    const NEVER: &[&str] = &[
+        "activate",
+        "alpha",
+        "as-they-sit",
+        "calibrate",
+        "calibrate-flat",
+        "checkpoint",
+        "closing",
+        "cost",
+        "dim",
+        "engage",
+        "epochs",
+        "epsilon",
+        "finish",
+        "firmware",
+        "flat",
+        "force",
+        "hidden",
+        "hold-out",
+        "ideal",
+        "input",
+        "int16",
+        "json",
+        "keep-anyway",
+        "lambda",
+        "left",
+        "list",
+        "log",
+        "no-start-pairs",
+        "normal",
+        "normalise",
+        "on-chip",
+        "out",
+        "pairs",
+        "pairs-file",
+        "poses",
+        "profile",
+        "quick",
+        "raw",
+        "resume",
+        "schedule",
+        "seconds",
+        "seed",
+        "seeds",
+        "stop-at",
+        "swap",
+        "target",
+        "threads",
+        "to",
+        "trust-model",
+        "truth",
+        "undo",
+        "volume",
+        "write",
+    ];
+
+    fn options(command: &clap::Command, into: &mut Vec<(String, bool)>) {
+        for arg in command.get_arguments() {
+            let valued = matches!(arg.get_action(), ArgAction::Set);
+            into.extend(arg.get_long().map(|long| (long.to_owned(), valued)));
+        }
+        command.get_subcommands().for_each(|sub| options(sub, into));
+    }
+
+    #[test]
+    fn every_option_of_every_verb_has_its_setting_or_is_known_to_have_none() {
+        let command = Cli::command();
+        let mut undecided = Vec::new();
+        let mut had = std::collections::BTreeSet::new();
+        for verb in command.get_subcommands() {
+            let name = verb.get_name();
+            let mut all = Vec::new();
+            options(verb, &mut all);
+            for (long, valued) in all.iter().filter(|(long, _)| long != "help") {
+                let behind = BEHIND.iter().find(|(option, ..)| option == long);
+                let from_file = behind.is_some_and(|(.., verbs)| verbs.contains(&name));
+                let other = OTHERS.iter().any(|(v, o, _)| (*v, *o) == (name, long));
+                let never = NEVER.contains(&long.as_str());
+                assert!(!(from_file && other), "{name} --{long}");
+                match (valued, behind) {
+                    (true, Some(_)) if from_file || other => had.insert((name, long.clone())),
+                    (_, None) if never => continue,
+                    // A flag of an option's name: `train --force` against what presses.
+                    (false, Some(_)) if never => continue,
+                    _ => {
+                        undecided.push(format!("{name} --{long}"));
+                        continue;
+                    }
+                };
+            }
+        }
+        assert!(undecided.is_empty(), "settings or not? {undecided:?}");
+        // And none in the table that is no option.
+        for (option, _, verbs) in BEHIND {
+            for verb in *verbs {
+                assert!(
+                    had.contains(&(verb, (*option).to_owned())),
+                    "{verb} --{option}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn every_key_but_the_keyboard_s_is_behind_an_option_that_takes_all_its_values() {
+        use host::settings::{KEYS, Kind};
+        for key in KEYS.iter().filter(|key| key.kind != Kind::Key) {
+            let (option, _, verbs) = BEHIND
+                .iter()
+                .find(|(_, behind, _)| *behind == key.name)
+                .unwrap_or_else(|| panic!("{} is of no use", key.name));
+            let values: Vec<String> = match key.kind {
+                Kind::Whole(least, most) => vec![least.to_string(), most.to_string()],
+                Kind::OneOf(numbers) => numbers.iter().map(i64::to_string).collect(),
+                Kind::Choice(words) => words.iter().map(|word| format!("\"{word}\"")).collect(),
+                _ if key.example.is_empty() => vec![key.default.to_owned()],
+                _ => vec![key.example.to_owned()],
+            };
+            assert!(key.help.contains(&format!("--{option}")), "{}", key.name);
+            for (verb, value) in verbs
+                .iter()
+                .flat_map(|v| values.iter().map(move |x| (v, x)))
+            {
+                let (section, name) = key.name.split_once('.').unwrap();
+                let file = format!("[{section}]\n{name} = {value}\n");
+                // About a family `doctor` asks where a gripper is named.
+                let line = match (*verb, *option) {
+                    ("doctor", "gripper-model") => "gauntlet doctor --gripper /dev/r".to_owned(),
+                    _ => format!("gauntlet {verb}"),
+                };
+                let settings = Settings::parse(Path::new("s.toml"), &file).unwrap();
+                let typed: Vec<OsString> = line.split_whitespace().map(OsString::from).collect();
+                let command = with(Cli::command(), &settings, &typed);
+                command.clone().debug_assert();
+                let verb = command.find_subcommand(verb).unwrap();
+                assert!(
+                    takes(verb, option),
+                    "{} --{option}: {file}",
+                    verb.get_name()
+                );
+            }
+        }
+    }
+
+    /// Whether an option of a verb, or of one below it, takes its default.
+    fn takes(command: &clap::Command, option: &str) -> bool {
+        let named = |arg: &&Arg| arg.get_long() == Some(option);
+        let here = command.get_arguments().find(named).is_some_and(|arg| {
+            let value = arg.get_default_values().first().cloned();
+            let alone = Arg::new("alone")
+                .value_parser(arg.get_value_parser().clone())
+                .default_value(value.unwrap_or_default());
+            let alone = clap::Command::new("alone").arg(alone);
+            alone.try_get_matches_from(["alone"]).is_ok()
+        });
+        here || command.get_subcommands().any(|sub| takes(sub, option))
     }
 
     #[test]
@@ -219,7 +466,7 @@ model = \"mine.safetensors\"
         for other in [
             "gauntlet",
             "gauntlet settings",
-            "gauntlet simulate",
+            "gauntlet ports",
             "gauntlet teleop --help",
         ] {
             assert!(!uses(&words(other)), "{other}");

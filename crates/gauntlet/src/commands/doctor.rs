@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use anyhow::Result;
 use clap::Args;
 
-use crate::options::LineOptions;
+use crate::options::{LineOptions, ReadingOptions};
 use crate::progress::Person;
 use crate::results::{self, devices};
 use crate::say;
@@ -36,6 +36,9 @@ pub struct Doctor {
     /// The glove's serial port, or `i2c:/dev/i2c-N`.
     #[arg(long, value_name = "PORT")]
     pub glove: Option<PathBuf>,
+    /// How the glove is read.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// How the gripper's line differs from that of a gripper as delivered.
     #[command(flatten)]
     pub line: LineOptions,
@@ -73,7 +76,7 @@ pub(crate) fn run(options: &Doctor, interrupt: &Interrupt) -> Result<()> {
         examine("gripper", path.display().to_string(), findings);
     }
     if let Some(path) = &options.glove {
-        let findings = diagnose::glove(path, interrupt);
+        let findings = diagnose::glove(path, options.reading.given(), interrupt);
         examine("glove", path.display().to_string(), findings);
     }
     if all.is_empty() {

@@ -7,6 +7,7 @@ use ratatui::style::{Color, Style};
 use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph};
 
+use super::headings::{self, Heading};
 use super::moving::Axis;
 use super::parts::{BOLD, DIM, bar, fault_lines, hand_table, heading, key_lines};
 use super::small;
@@ -23,9 +24,13 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
         return small::draw(view, frame);
     }
     let keys = key_lines(&view.keys, area.width);
-    let [head, hand, gripper, numbers, faults, foot] = Layout::vertical([
+    // Where there is room for them beside two lines of what is wrong.
+    let room = area.height >= BOXES.1 + headings::ROWS + 2 && !view.headings.is_empty();
+    let sure = if room { headings::ROWS + 2 } else { 0 };
+    let [head, hand, sigma, gripper, numbers, faults, foot] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(8),
+        Constraint::Length(sure),
         Constraint::Length(6),
         Constraint::Length(4),
         Constraint::Min(3),
@@ -34,6 +39,9 @@ pub fn draw(view: &View, frame: &mut Frame<'_>) {
     .areas(area);
     frame.render_widget(heading(&view.heading()), head);
     draw_hand(view, frame, hand);
+    if room {
+        draw_headings(&view.headings, frame, sigma);
+    }
     draw_gripper(view, frame, gripper);
     frame.render_widget(
         Paragraph::new(rates(view)).block(Block::bordered().title("loop")),
@@ -54,8 +62,23 @@ pub(super) fn titled(title: &str, age: Option<f32>) -> Block<'static> {
     }
 }
 
+/// How sure each joint's heading is.
+pub(super) fn draw_headings(headings: &[Heading], frame: &mut Frame<'_>, area: Rect) {
+    let block = Block::bordered().title("headings: sigma, drift; red: its joint is held");
+    let inner = block.inner(area);
+    frame.render_widget(block, area);
+    frame.render_widget(
+        Paragraph::new(headings::table(headings, inner.width)),
+        inner,
+    );
+}
+
 fn draw_hand(view: &View, frame: &mut Frame<'_>, area: Rect) {
-    let block = titled("hand: joint angles, degrees", view.hand_age);
+    let title = match headings::summary(&view.headings) {
+        Some(sure) => format!("hand: joint angles, degrees; {sure}"),
+        None => "hand: joint angles, degrees".to_owned(),
+    };
+    let block = titled(&title, view.hand_age);
     let inner = block.inner(area);
     frame.render_widget(block, area);
     frame.render_widget(

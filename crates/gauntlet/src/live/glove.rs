@@ -9,12 +9,14 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Block, Paragraph};
 
 use super::Scene;
-use super::draw::titled;
+use super::draw::{draw_headings, titled};
+use super::headings;
 use super::moving::Finger;
 use super::parts::{BOLD, DIM, Heading, fault_lines, hand_table, heading, key_lines, wrapped};
 use super::small::{hand_line, too_small};
 use super::view::old;
 use host::stats::short_or_dash;
+use host::words;
 
 /// The least terminal for boxes: columns, rows.
 const BOXES: (u16, u16) = (80, 23);
@@ -61,14 +63,16 @@ pub struct GloveView {
     pub hand_age: Option<f32>,
     /// Whether the angles are those of the hand; else those of sensors that would sit straight.
     pub calibrated: bool,
+    /// How sure the joints' headings are; none without a profile.
+    pub headings: Vec<headings::Heading>,
     /// The 16 sensors.
     pub sensors: Vec<Sensor>,
     /// Scans a second.
     pub scans_per_s: f64,
     /// How far 99 of 100 intervals between scans stay from the one before, µs.
     pub jitter_us: Option<u64>,
-    /// Speed of the line.
-    pub baud: u32,
+    /// Speed of the line, baud; `None` on an I²C port.
+    pub baud: Option<u32>,
     /// What is wrong now, in words; empty when all is well.
     pub faults: Vec<String>,
     /// What keys do.
@@ -90,17 +94,20 @@ impl GloveView {
         let good = self.sensors.iter().filter(|sensor| sensor.good).count();
         let lost: u64 = self.sensors.iter().map(|sensor| sensor.lost).sum();
         format!(
-            "{good} of 16 sensors good   {:.1} scans/s   jitter {}   samples lost {lost}   {} baud",
+            "{good} of 16 sensors good   {:.1} scans/s   jitter {}   samples lost {lost}   {}",
             self.scans_per_s,
             short_or_dash(self.jitter_us),
-            self.baud
+            words::line_speed(self.baud)
         )
     }
 
-    fn hand_title(&self) -> &'static str {
-        match self.calibrated {
-            true => "hand: joint angles, degrees",
-            false => "hand: NOT CALIBRATED, as if the sensors sat straight; degrees",
+    fn hand_title(&self) -> String {
+        match (self.calibrated, headings::summary(&self.headings)) {
+            (true, Some(sure)) => format!("hand: joint angles, degrees; {sure}"),
+            (true, None) => "hand: joint angles, degrees".to_owned(),
+            (false, _) => {
+                "hand: NOT CALIBRATED, as if the sensors sat straight; degrees".to_owned()
+            }
         }
     }
 
@@ -111,9 +118,13 @@ impl GloveView {
     fn boxes(&self, frame: &mut Frame<'_>) {
         let area = frame.area();
         let keys = key_lines(&self.keys, area.width);
-        let [head, hand, sensors, rates, faults, foot] = Layout::vertical([
+        let room = area.height >= BOXES.1 + headings::ROWS + 2;
+        let room = room && self.calibrated && !self.headings.is_empty();
+        let sure = if room { headings::ROWS + 2 } else { 0 };
+        let [head, hand, sigma, sensors, rates, faults, foot] = Layout::vertical([
             Constraint::Length(1),
             Constraint::Length(8),
+            Constraint::Length(sure),
             Constraint::Length(10),
             Constraint::Length(1),
             Constraint::Min(2),
@@ -121,11 +132,14 @@ impl GloveView {
         ])
         .areas(area);
         frame.render_widget(heading(&self.heading()), head);
-        let block = titled(self.hand_title(), self.hand_age);
+        let block = titled(&self.hand_title(), self.hand_age);
         let inner = block.inner(hand);
         frame.render_widget(block, hand);
         let table = hand_table(&self.fingers, self.live(), inner.width);
         frame.render_widget(Paragraph::new(table), inner);
+        if room {
+            draw_headings(&self.headings, frame, sigma);
+        }
         self.draw_sensors(frame, sensors);
         frame.render_widget(Line::raw(self.rates()), rates);
         let lines = fault_lines(&self.faults, faults.width, faults.height.into());
@@ -281,10 +295,11 @@ mod tests {
             fingers: FINGER_NAMES.map(finger).into(),
             hand_age: None,
             calibrated: false,
+            headings: Vec::new(),
             sensors: SEGMENT_NAMES.map(sensor).into(),
             scans_per_s: 35.2,
             jitter_us: Some(1_100),
-            baud: 115_200,
+            baud: Some(115_200),
             faults: vec!["the sensor on ring_middle is frozen".to_owned()],
             keys: "q: end".to_owned(),
         }

@@ -5,6 +5,7 @@ mod bars;
 mod draw;
 pub mod glove;
 pub mod guided;
+pub mod headings;
 mod key;
 mod keys;
 mod moving;

@@ -31,6 +31,7 @@ fn view() -> View {
             .map(|(name, first)| finger(name, first))
             .collect(),
         hand_age: None,
+        headings: Vec::new(),
         axes: [
             ("finger A", 128),
             ("finger B", 255),

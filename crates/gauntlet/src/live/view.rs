@@ -2,8 +2,9 @@
 
 use std::time::Duration;
 
+use super::headings::{self, Heading};
 use super::moving::{Axis, Finger};
-use super::parts::Heading;
+use super::parts;
 use host::stats::short_or_dash;
 
 /// Everything the view shows.
@@ -23,6 +24,8 @@ pub struct View {
     pub fingers: Vec<Finger>,
     /// Age of the hand's angles in seconds, where they are old.
     pub hand_age: Option<f32>,
+    /// How sure the joints' headings are; none without a profile.
+    pub headings: Vec<Heading>,
     /// The gripper's axes.
     pub axes: Vec<Axis>,
     /// Age of the gripper's positions in seconds, where they are old.
@@ -46,8 +49,8 @@ pub struct View {
 }
 
 impl View {
-    pub(super) fn heading(&self) -> Heading<'_> {
-        Heading {
+    pub(super) fn heading(&self) -> parts::Heading<'_> {
+        parts::Heading {
             title: &self.title,
             state: &self.state,
             good: self.following,
@@ -77,13 +80,15 @@ impl View {
         .into_iter()
         .flatten()
         .collect::<String>();
+        let sure = headings::summary(&self.headings);
+        let sure = sure.map_or_else(String::new, |sure| format!("  {sure}"));
         let fault = if self.faults.is_empty() {
             String::new()
         } else {
             format!(" | {}", self.faults.join("; "))
         };
         format!(
-            "{:5.1} s  {:<11} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{old}{fault}",
+            "{:5.1} s  {:<11} {}  glove {:.1}/s  gripper {:.1}/s  latency p50 {} p99 {}  dropped {}{sure}{old}{fault}",
             self.elapsed.as_secs_f64(),
             self.state,
             axes.join("  "),

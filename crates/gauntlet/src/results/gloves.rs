@@ -11,6 +11,7 @@ use host::scanning::Snapshot;
 use host::training::recorded::Seen;
 use serde::Serialize;
 
+use super::headings::Joint;
 use super::runs::Poses;
 
 /// `glove watch`.
@@ -25,6 +26,8 @@ pub struct Watched {
     /// How often it was read.
     #[serde(flatten)]
     pub scanned: Scanned,
+    /// How sure its joints' headings were at the end; `null` without a profile.
+    pub joints: Option<Vec<Joint>>,
     /// Its sensors, in the order of the segments.
     pub sensors: Vec<Sensor>,
     /// What was found out about them meanwhile, in words.
@@ -36,7 +39,7 @@ pub struct Watched {
 /// How often a glove was read.
 #[derive(Debug, Default, Serialize)]
 pub struct Scanned {
-    /// Speed of its line; `null` where a bridge on a chip reads it.
+    /// Speed of its line; `null` on an I²C port, and where a bridge on a chip reads it.
     pub baud: Option<u32>,
     /// Scans of all 16 sensors.
     pub scans: u64,
@@ -59,7 +62,7 @@ pub struct Scanned {
 impl From<&Snapshot> for Scanned {
     fn from(seen: &Snapshot) -> Self {
         Self {
-            baud: Some(seen.baud),
+            baud: seen.baud,
             scans: seen.frames,
             scans_per_s: seen.mean_rate,
             interval_p50_us: seen.interval_us.map(|[median, ..]| median),

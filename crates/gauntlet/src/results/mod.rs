@@ -7,6 +7,7 @@
 pub mod calibrations;
 pub mod devices;
 pub mod gloves;
+pub mod headings;
 pub mod maps;
 pub mod paper;
 pub mod runs;

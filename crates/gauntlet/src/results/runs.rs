@@ -11,6 +11,7 @@ use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::training::quality::Quality;
 
+use super::headings::Joint;
 use crate::wearer::Fit;
 
 /// What is left of a run: `teleop`, `bridge engage`, `bridge monitor`, `bridge log`.
@@ -20,6 +21,10 @@ pub struct Run<'a> {
     pub gripper: Option<Stopped>,
     /// Its numbers.
     pub run: &'a Summary,
+    /// Speed of the glove's line at the end, baud; `null` on an I²C port and with a bridge on a chip.
+    pub glove_baud: Option<u32>,
+    /// How sure the joints' headings were at the end; `null` without a profile.
+    pub joints: Option<Vec<Joint>>,
     /// The session log.
     pub log: Option<&'a Written>,
     /// The poses file of `bridge log`.
@@ -54,6 +59,8 @@ pub struct Demo<'a> {
     pub person: Option<&'a Person>,
     /// How the map came into the chip; `null` in this process.
     pub flash: Option<&'a Flashed>,
+    /// From the start of the program to the gripper's first motion with the hand, s; `null` without one.
+    pub first_motion_from_start_s: Option<f64>,
     /// The run.
     #[serde(flatten)]
     pub run: Run<'a>,

@@ -2,11 +2,12 @@
 
 use anyhow::Result;
 
+use crate::results::headings::joints;
 use crate::results::runs;
 use crate::tell::Tell;
 use host::failure::{Failure, Told, with_others};
 use host::recording::Written;
-use host::session::{Devices, Ending, Stopped, Summary};
+use host::session::{Devices, Ending, Snapshot, Stopped, Summary};
 
 /// What is left when a run is over.
 #[derive(Debug)]
@@ -17,6 +18,8 @@ pub struct Finished {
     pub log: Option<Written>,
     /// How the gripper was left; a failure where the bridge ended by itself and did not hold it.
     pub stopped: Result<Stopped>,
+    /// The newest state before that.
+    pub seen: Option<Snapshot>,
     /// How everything was before that; `None` where driving never began.
     pub ending: Option<Ending>,
     /// The gripper was told to activate.
@@ -37,6 +40,12 @@ impl Finished {
         runs::Run {
             gripper: self.stopped.as_ref().ok().copied(),
             run: &self.summary,
+            glove_baud: self.seen.and_then(|seen| seen.glove_baud),
+            joints: self
+                .seen
+                .and_then(|seen| seen.headings)
+                .as_ref()
+                .map(joints),
             log: self.log.as_ref(),
             poses: None,
             failure,
@@ -167,6 +176,7 @@ mod tests {
                 fault: fault.map(str::to_owned),
             }),
             stopped,
+            seen: None,
             ending,
             activated: false,
             devices: Devices::Unknown,

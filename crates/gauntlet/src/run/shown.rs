@@ -7,7 +7,7 @@ use bridge::calibration::{Refusal, Try};
 use bridge::clutch::Position;
 use bridge::event::Kind;
 use bridge::{HoldReason, State};
-use glove::hand::{LIMITS, SEGMENT_COUNT};
+use glove::hand::{LIMITS, SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::scan::{Finding, Health};
 use gripper::{Activation, Contact};
 
@@ -297,6 +297,7 @@ fn standing(snapshot: &Snapshot, hands: &Hands) -> Vec<String> {
         faults.push(Kind::Calibration(Try::Waiting).to_string());
     }
     faults.extend(snapshot.unused_sensors());
+    faults.extend(unsure(snapshot));
     if snapshot.on_chip {
         // Of a bridge on a chip no events come.
         let silent = |answers: bool, what: &str| (!answers).then(|| what.to_owned());
@@ -322,6 +323,24 @@ fn standing(snapshot: &Snapshot, hands: &Hands) -> Vec<String> {
         }
     }
     faults
+}
+
+/// The joints that are held because their heading is not sure enough; while the glove is calibrated at all.
+fn unsure(snapshot: &Snapshot) -> Option<String> {
+    let headings = snapshot
+        .headings
+        .filter(|_| !snapshot.lacks_calibration())?;
+    let named = |mask: u16| -> Vec<&str> {
+        let held = (0..SEGMENT_COUNT).filter(|k| mask >> k & 1 == 1);
+        held.map(|k| SEGMENT_NAMES[k]).collect()
+    };
+    let degraded = named(headings.degraded & !headings.unknown);
+    (!degraded.is_empty()).then(|| {
+        format!(
+            "held, their heading is not sure enough: the joints at {}; a flat hand mends it",
+            degraded.join(", ")
+        )
+    })
 }
 
 /// The fingers of the hand.
@@ -352,6 +371,7 @@ mod tests {
     /// Of a bridge with devices that work, whose glove is not calibrated.
     fn uncalibrated(clutch: Position, state: State) -> Snapshot {
         Snapshot {
+            glove_baud: None,
             now: Time::from_ticks(0),
             state,
             clutch,

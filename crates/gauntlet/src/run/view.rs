@@ -8,7 +8,7 @@ use bridge::clutch::Position;
 
 use super::shown::{self, Hands};
 use super::{Options, Run};
-use crate::live::{Bindings, View};
+use crate::live::{Bindings, View, headings};
 use host::next::Command;
 use host::session::{CLOSED_TOO_LATE, Devices, Snapshot};
 
@@ -27,6 +27,7 @@ impl Run {
             following: false,
             fingers: Vec::new(),
             hand_age: None,
+            headings: Vec::new(),
             axes: Vec::new(),
             gripper_age: None,
             frames_per_s: progress.frames_per_s,
@@ -46,6 +47,7 @@ impl Run {
             view.following = snapshot.state.is_moving();
             view.fingers = shown::fingers(snapshot);
             view.hand_age = shown::glove_age(snapshot);
+            view.headings = headings::of(snapshot.headings);
             view.axes = self.shown.axes(snapshot, Instant::now());
             view.gripper_age = shown::gripper_age(snapshot);
         }

@@ -13,7 +13,7 @@
 //!
 //! **Lowering.** A speed at which the trial fails [`RAISE_TRIES`] times, or that loses too many replies
 //! ([`LOSSES_MAX`]), is ruled out until the chip's next restart. A chip that may sit at such a speed is told the
-//! lower one unheard. Never below the speed the port was opened with.
+//! lower one unheard. Never below [`FLOOR`], or the speed the port was opened with where that is lower.
 //!
 //! What cannot be mended from here: a byte of the divisor itself spoiled on its way leaves the chip at a speed nobody looks
 //! for, until its power is cut. So a speed is left only after a trial at it, where one passes.
@@ -60,6 +60,9 @@ pub const RESET_BAUD: u32 = 9_600;
 /// The speeds at which a chip is looked for and to which it is raised, from the highest.
 pub const SPEEDS: [u32; 4] = [460_800, 230_400, 115_200, RESET_BAUD];
 
+/// No chip that is raised is ever lowered below this: the glove's samples would be too old to follow.
+pub const FLOOR: u32 = 115_200;
+
 /// Status bytes that must come in a row, all the same and nothing between them, before a speed is trusted.
 pub const TRIAL: usize = 8;
 
@@ -80,7 +83,7 @@ pub(super) struct Speeds<S> {
     set: Option<Set<S>>,
     /// Of the port now.
     line: u32,
-    /// Of the port when it was handed over.
+    /// No chip is lowered below it.
     floor: u32,
     /// Highest one wished for, and highest not ruled out.
     limit: u32,
@@ -103,7 +106,7 @@ impl<S> Speeds<S> {
         Self {
             set: None,
             line: baud,
-            floor: baud,
+            floor: raise_to.map_or(baud, |_| baud.min(FLOOR)),
             limit,
             ceiling: limit,
             told: baud,

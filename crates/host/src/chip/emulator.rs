@@ -6,6 +6,7 @@
 
 use std::ffi::OsString;
 use std::fs::File;
+use std::os::unix::fs::symlink;
 use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -14,6 +15,7 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use tempfile::TempDir;
 
+use crate::calibration::virtual_person;
 use crate::chip::link::{Address, HostLink};
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
@@ -28,6 +30,8 @@ pub const FIRMWARE: &str = "GAUNTLET_FIRMWARE";
 const BUILT: &str = "target/firmware/thumbv7em-none-eabihf/release/firmware-sim";
 /// The firmware must answer this long after power-on, also on a busy machine.
 const START_WAIT: Duration = Duration::from_secs(20);
+/// The host protocol's socket in the emulator's folder.
+const HOST_SOCKET: &str = "host.sock";
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// What an emulator is made of.
@@ -113,6 +117,13 @@ impl Emulator {
                 || "no temporary folder can be made".to_owned(),
                 "a TMPDIR with room that you may write to",
             )?;
+        if let Some(glove) = &setup.glove
+            && let Ok(glove) = std::path::absolute(glove)
+        {
+            // Whoever speaks to the bridge asks the virtual person in its glove, where there is one; a real glove has none.
+            let ear = virtual_person::place(&folder.path().join(HOST_SOCKET));
+            let _ = symlink(virtual_person::place(&glove), ear);
+        }
         Ok(Self {
             setup,
             folder,
@@ -122,7 +133,7 @@ impl Emulator {
 
     /// Where the host protocol is spoken.
     pub fn address(&self) -> Address {
-        Address::Unix(self.folder.path().join("host.sock"))
+        Address::Unix(self.folder.path().join(HOST_SOCKET))
     }
 
     /// The file that is the weights flash.
@@ -142,7 +153,7 @@ impl Emulator {
     pub fn power_on(&mut self) -> Result<()> {
         self.power_off();
         // The socket of the last time would look like this time's.
-        let _ = std::fs::remove_file(self.folder.path().join("host.sock"));
+        let _ = std::fs::remove_file(self.folder.path().join(HOST_SOCKET));
         let words = File::create(self.words_file()).or_fail(
             || "the emulator's folder takes no file".to_owned(),
             "room on the disk",
@@ -259,7 +270,7 @@ impl Emulator {
                 &self.flash_file(),
             ),
         );
-        let socket = self.folder.path().join("host.sock");
+        let socket = self.folder.path().join(HOST_SOCKET);
         let socket = with_path("socket,id=host,server=on,wait=off,path=", &socket);
         option("-chardev", socket);
         option("-serial", "chardev:host".into());

@@ -6,13 +6,14 @@ mod exchange;
 mod i2c;
 mod own;
 mod sensors;
+mod worn;
 
 use std::path::Path;
 use std::time::Duration;
 
 use glove::hand::SEGMENT_COUNT;
 use glove::mux;
-use glove::scan::{Config, Health, Scanner};
+use glove::scan::Health;
 
 use super::Findings;
 use super::answer::Came;
@@ -20,22 +21,24 @@ use super::search::persist;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::lines::UNIT;
+use crate::lines::glove::{GloveLine, Reading};
 use crate::lines::i2c::Address;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
 use crate::next::{Command, advice};
 use bridge_chip::{
-    BAUDS, BUS_HUNG, DONE, MULTIPLEXERS, NO_ACKNOWLEDGE, READ_STATUS, RESET_BAUD, SET_TIMEOUT, WAIT,
+    BAUDS, BUS_HUNG, DONE, FAST_BAUD, MULTIPLEXERS, NO_ACKNOWLEDGE, READ_STATUS, RESET_BAUD,
+    SET_TIMEOUT, WAIT,
 };
 use bridge_line::{UNKEPT_NEXT, ask, nobody, survey, unkept};
 pub use i2c::multiplexer_answers;
 
-/// Finds out which layer of the glove at `path` fails. Ends within half a minute, whatever comes.
-pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
+/// Finds out which layer of the glove at `path` fails, read as `reading` says. Ends within half a minute, whatever comes.
+pub fn glove(path: &Path, reading: Reading, interrupt: &Interrupt) -> Findings {
     let mut findings = Findings::default();
     match Address::parse(path) {
         Ok(None) => {}
-        Ok(Some(address)) => return i2c::glove(&address, interrupt),
+        Ok(Some(address)) => return i2c::glove(&address, reading, interrupt),
         Err(failure) => {
             findings.failure("port", &failure);
             return findings;
@@ -46,14 +49,15 @@ pub fn glove(path: &Path, interrupt: &Interrupt) -> Findings {
         if let Some(what) = unkept(&mut port, interrupt) {
             findings.wrong("bridge", what, UNKEPT_NEXT);
         } else if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
-            let config = Config {
-                baud,
-                mux: address,
-                ..Config::default()
-            };
             let watch = port.watch();
-            let scanner = Scanner::new(port, config);
-            sensors::sensors(scanner, address, watch, &mut findings, interrupt);
+            let scanner = GloveLine::from(port).scanner_at(reading, address);
+            let glove = sensors::Examined {
+                place: path,
+                mux: address,
+                reading,
+                found: Some(baud),
+            };
+            sensors::sensors(scanner, &glove, watch, &mut findings, interrupt);
         }
     }
     findings
@@ -89,7 +93,7 @@ pub fn missing_sensors(health: &[Health; SEGMENT_COUNT]) -> Findings {
 /// Why no sensor of the glove at `path` gives an orientation, though its serial bridge answers. The failure begins with
 /// `what`.
 pub fn no_sensors(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
-    let findings = glove(path, interrupt);
+    let findings = glove(path, Reading::default(), interrupt);
     findings.as_failure(what).unwrap_or_else(|| {
         Failure::new(
             format!("{what} in time, though they do now"),
@@ -160,7 +164,7 @@ fn find(
 
 /// Whether a glove's serial bridge answers at `path`, at the speed it is set to or that of its power-on.
 pub(super) fn glove_answers(path: &Path, interrupt: &Interrupt) -> bool {
-    [BAUD, RESET_BAUD].into_iter().any(|baud| {
+    [BAUD, FAST_BAUD, RESET_BAUD].into_iter().any(|baud| {
         Port::open(path, baud).is_ok_and(|mut port| {
             // Noise may look like it once.
             (0..3).all(|_| {
@@ -185,13 +189,9 @@ fn bridge(baud: u32, status: u8, findings: &mut Findings) {
         RESET_BAUD => findings.note(
             "bridge",
             format!("{what}, as after power-on"),
-            "nothing: teleop switches it to 115200",
+            "nothing: every verb finds it there, and raises it",
         ),
-        _ => findings.note(
-            "bridge",
-            format!("{what}, where another program left it"),
-            "nothing: teleop switches it to 115200",
-        ),
+        _ => findings.good("bridge", format!("{what}, where it was left")),
     }
     // The status is that of the last transfer, which may have been somebody else's.
     if status == BUS_HUNG {

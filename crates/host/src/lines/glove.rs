@@ -1,13 +1,76 @@
 //! The ways to a glove's sensors: a serial port with an SC18IM, or an I²C port of this computer.
 
-use glove::Instant;
 use glove::bus::{Batch, Bus, Error, Reply};
-use glove::sc18im::Sc18im;
+use glove::sc18im::{self, SPEEDS, Sc18im};
 use glove::scan::{BusScanner, Config, Scanner};
 use glove::timing::FUSION_PERIOD;
+use glove::{Instant, imu, mux};
 
 use super::i2c;
-use super::port::{Port, Watch};
+use super::port::{BAUD, Port, Watch};
+use crate::next::{Command, NextStep, Warning};
+
+/// The speeds to which a glove's serial line may be raised, baud, from the lowest.
+pub const RAISED: [u32; 3] = [SPEEDS[2], SPEEDS[1], SPEEDS[0]];
+
+/// What a person may choose of how a glove is read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Reading {
+    /// Highest speed of its serial line, baud: one of [`RAISED`]. The serial bridge is raised to the highest up to it that answers
+    /// without errors.
+    pub baud: u32,
+    /// Whether the serial bridge is asked after each read how it went. At 460800 baud that costs 4 of 100 scans.
+    pub status_checks: bool,
+    /// Which fusion the sensors run. NDOF has a compass, which is worse than none near metal.
+    pub mode: imu::Mode,
+}
+
+impl Default for Reading {
+    fn default() -> Self {
+        Self {
+            baud: SPEEDS[0],
+            status_checks: true,
+            mode: imu::Mode::Imu,
+        }
+    }
+}
+
+impl Reading {
+    /// The scanner's settings on `line`.
+    fn config(self, line: &GloveLine) -> Config {
+        let usual = Config::default();
+        let (baud, period) = match line {
+            GloveLine::Serial(port) => (port.baud(), usual.period),
+            // A scan takes less than the sensors need for new samples: no more than one begins in that time.
+            GloveLine::I2c(_) => (BAUD, usual.period.max(FUSION_PERIOD)),
+        };
+        Config {
+            baud,
+            raise_to: Some(self.baud),
+            status_checks: self.status_checks,
+            imu: imu::Config {
+                mode: self.mode,
+                ..usual.imu
+            },
+            period,
+            ..usual
+        }
+    }
+
+    /// What is wrong with a line that runs at `baud`; `None` where it runs as fast as asked for. `again` is what named the speed.
+    pub fn slow(self, place: &str, baud: u32) -> Option<Warning> {
+        if baud >= self.baud {
+            return None;
+        }
+        let what = format!(
+            "the glove's line on {place} runs at {baud} baud: at {} it does not answer without errors, or the port cannot make it",
+            self.baud
+        );
+        let next = NextStep::same(Command::more().option("--glove-baud", baud))
+            .then(" asks for no more; a shorter cable, or another adapter, may carry it");
+        Some(Warning::new(what, next))
+    }
+}
 
 /// An open way to a glove.
 #[derive(Debug)]
@@ -27,18 +90,23 @@ impl GloveLine {
         }
     }
 
-    /// The scanner on it. The speed of a serial port is found and kept by it; on an I²C port a scan takes less than the sensors need
-    /// for new samples, so that it begins no more than one in that time.
-    pub fn scanner(self, mut config: Config) -> BusScanner<GloveBus> {
+    /// The scanner on it. The speed of a serial port is found, raised and kept by it.
+    pub fn scanner(self, reading: Reading) -> BusScanner<GloveBus> {
+        self.scanner_at(reading, mux::ADDRESS)
+    }
+
+    /// The same with the multiplexer at the address `mux`.
+    pub fn scanner_at(self, reading: Reading, mux: u8) -> BusScanner<GloveBus> {
+        let config = Config {
+            mux,
+            ..reading.config(&self)
+        };
         let bus = match self {
             Self::Serial(port) => {
                 let scanner = Scanner::new(port, config).with_set_baud();
                 GloveBus::Serial(Box::new(scanner.into_bus()))
             }
-            Self::I2c(port) => {
-                config.period = config.period.max(FUSION_PERIOD);
-                GloveBus::I2c(port)
-            }
+            Self::I2c(port) => GloveBus::I2c(port),
         };
         BusScanner::on(bus, config)
     }
@@ -60,6 +128,14 @@ pub enum GloveBus {
 }
 
 impl GloveBus {
+    /// The serial bridge's counts; none on an I²C port.
+    pub fn link_counters(&self) -> Option<&sc18im::Counters> {
+        match self {
+            Self::Serial(bus) => Some(bus.counters()),
+            Self::I2c(_) => None,
+        }
+    }
+
     fn bus(&self) -> &dyn Bus {
         match self {
             Self::Serial(bus) => &**bus,

@@ -144,6 +144,11 @@ impl Port {
         })
     }
 
+    /// The speed it is open at, baud.
+    pub fn baud(&self) -> u32 {
+        self.shared.baud.load(Ordering::Relaxed)
+    }
+
     /// A handle to wait on this port and to see how it fares, for another owner than the driver's.
     pub fn watch(&self) -> Watch {
         Watch {

@@ -23,13 +23,14 @@ const STRAGGLERS: Duration = Duration::from_secs(2);
 pub struct BringUp {
     /// It is read.
     pub scanning: Scanning,
-    /// The speed it spoke where it was another, and was switched.
-    pub switched: Option<u32>,
+    /// The speed it spoke; `None` on an I²C port.
+    pub found: Option<u32>,
     /// Sensors that give none, as `doctor` says it; empty where all 16 do.
     pub missing: Findings,
 }
 
-/// Opens the glove's port, finds its serial bridge, brings its sensors up and reads them. Ends within a minute.
+/// Opens the way to the glove (a serial port, or `i2c:/dev/i2c-N`), finds its serial bridge or its multiplexer, brings its sensors up
+/// and reads them. Ends within a minute.
 ///
 /// # Errors
 /// A failure that names the layer that fails and what to try; that the end was asked for.
@@ -39,8 +40,8 @@ pub fn open(
     clock: Clock,
     interrupt: &Interrupt,
 ) -> Result<BringUp> {
-    let glove = probe::open_glove(path, interrupt)?;
-    let mut scanning = Scanning::start(glove.port, settings, clock, interrupt)?;
+    let glove = probe::open_glove_line(path, interrupt)?;
+    let mut scanning = Scanning::start(glove.line, settings, clock, interrupt)?;
     let framed = scanning.wait(FRAME_WAIT, interrupt, |seen| seen.frames > 0);
     if !framed {
         scanning.stop()?;
@@ -49,7 +50,7 @@ pub fn open(
         }
         // The port is free now.
         let what = format!(
-            "the glove's serial multiplexer on {} answers, but no sensor sent an orientation in {} s",
+            "the glove's multiplexer on {} answers, but no sensor sent an orientation in {} s",
             path.display(),
             FRAME_WAIT.as_secs()
         );
@@ -67,7 +68,7 @@ pub fn open(
     };
     Ok(BringUp {
         scanning,
-        switched: glove.switched,
+        found: glove.found,
         missing,
     })
 }

@@ -8,10 +8,12 @@ use bridge::posture::Posture;
 use glove::calibration::{Bound, Misfit};
 use glove::hand::flat::{FlatHand, Progress};
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT, Side};
+use glove::headings::PoseReport;
 use glove::scan::Frame;
 
 use super::Scanned;
 use crate::clock::since;
+use crate::session::snapshot::Headings;
 
 /// All joints, as a bit mask.
 const ALL: u32 = (1 << JOINT_COUNT) - 1;
@@ -58,6 +60,9 @@ pub struct Hand {
     pose: Option<(FlatHand, glove::Instant)>,
     /// How often each sensor had started and whose ids were known, as wired; `None` before the first scan.
     heard: Option<Heard>,
+    /// Flat poses taken with a profile, and what the newest found.
+    poses: u16,
+    report: Option<PoseReport>,
 }
 
 type Heard = (
@@ -73,6 +78,8 @@ impl Hand {
             flat: Flat::None,
             pose: None,
             heard: None,
+            poses: 0,
+            report: None,
         }
     }
 
@@ -107,9 +114,17 @@ impl Hand {
         self.posture.fit()
     }
 
-    /// Standard deviation of each joint's heading, by segment, radians; `None` where no profile says.
-    pub fn sigma(&self) -> Option<[f32; SEGMENT_COUNT]> {
-        self.posture.headings().map(|headings| headings.sigma())
+    /// What is known of the headings; `None` without a profile.
+    pub fn headings(&self) -> Option<Headings> {
+        let known = self.posture.headings()?;
+        Some(Headings {
+            sigma: known.sigma(),
+            drift: known.drift(),
+            degraded: known.degraded(),
+            unknown: known.unknown(),
+            poses: self.poses,
+            pose: self.report,
+        })
     }
 
     /// Takes a scan.
@@ -205,7 +220,11 @@ impl Hand {
             return self.refuse(misfit.to_string(), at);
         }
         match self.posture.end_pose(at) {
-            Ok(_) => self.flat = Flat::Taken,
+            Ok(report) => {
+                self.flat = Flat::Taken;
+                self.poses = self.poses.wrapping_add(1);
+                self.report = Some(report);
+            }
             Err(why) if at < until => {
                 self.begin_flat(at, since(until, at));
                 self.flat = Flat::Waiting(Some(why.to_string()));

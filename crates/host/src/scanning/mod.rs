@@ -1,6 +1,6 @@
 //! A glove that is read by itself: no gripper, no map, nothing moves.
 //!
-//! [`Scanning`] runs [`glove::scan::Scanner`] over an open glove line on a thread of its own. Every frame goes through a
+//! [`Scanning`] runs [`glove::scan::BusScanner`] over an open glove line on a thread of its own. Every frame goes through a
 //! bounded queue, in order; those that nobody takes in time are counted. Beside it stands the newest [`Snapshot`], which
 //! as many as like may look at. A glove that is unplugged is waited for; a thread that ends by a fault says so.
 
@@ -17,12 +17,13 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::scan::{self, Finding};
+use glove::scan::Finding;
 
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
-use crate::lines::port::{BAUD, Port, Watch};
+use crate::lines::glove::{GloveLine, Reading};
+use crate::lines::port::Watch;
 use crate::realtime;
 
 pub use bringup::{BringUp, open};
@@ -39,8 +40,8 @@ const LOOK: Duration = Duration::from_millis(20);
 /// How a glove is read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Settings {
-    /// How it is wired and run. `baud` must be what the port is opened with.
-    pub scan: scan::Config,
+    /// What a person chose of it.
+    pub reading: Reading,
     /// Frames that may wait to be taken, 1 at least.
     pub queue: usize,
 }
@@ -48,10 +49,7 @@ pub struct Settings {
 impl Default for Settings {
     fn default() -> Self {
         Self {
-            scan: scan::Config {
-                baud: BAUD,
-                ..scan::Config::default()
-            },
+            reading: Reading::default(),
             queue: QUEUE,
         }
     }
@@ -67,22 +65,22 @@ pub struct Scanning {
 }
 
 impl Scanning {
-    /// Reads the glove at `port`, with stamps of `clock`. A signal caught by `interrupt` ends a wait, not the reading.
+    /// Reads the glove on `line`, with stamps of `clock`. A signal caught by `interrupt` ends a wait, not the reading.
     ///
     /// # Errors
     /// A failure where the system gives no thread.
     pub fn start(
-        port: Port,
+        line: GloveLine,
         settings: Settings,
         clock: Clock,
         interrupt: &Interrupt,
     ) -> Result<Self> {
         let shared = Arc::new(Shared::default());
         let (hand, frames) = sync_channel(settings.queue.max(1));
-        let watch = port.watch();
+        let watch = line.watch();
         let worker = worker::Worker::new(
-            port,
-            settings.scan,
+            line,
+            settings.reading,
             clock,
             interrupt,
             hand,
@@ -129,7 +127,7 @@ impl Scanning {
         self.shared.begin.store(true, Ordering::Release);
     }
 
-    /// The glove's port.
+    /// The glove's line.
     pub fn port(&self) -> &Watch {
         &self.watch
     }
@@ -191,3 +189,6 @@ fn fault() -> Failure {
         "the same again, and report what it says",
     )
 }
+
+#[cfg(test)]
+mod i2c_tests;

@@ -37,8 +37,8 @@ pub struct Snapshot {
     pub now: Instant,
     /// What the scanner is doing.
     pub state: scan::State,
-    /// Speed of the serial line, baud.
-    pub baud: u32,
+    /// Speed of the serial line, baud; `None` on an I²C port.
+    pub baud: Option<u32>,
     /// Whether the port is there.
     pub is_plugged: bool,
     /// How often it went away.
@@ -49,8 +49,8 @@ pub struct Snapshot {
     pub frame: Option<Frame>,
     /// The scanner's counts since it started.
     pub counters: Counters,
-    /// The serial bridge's counts since it started.
-    pub link: sc18im::Counters,
+    /// The serial bridge's counts since it started; `None` on an I²C port.
+    pub link: Option<sc18im::Counters>,
     /// Frames.
     pub frames: u64,
     /// Frames that nobody took in time.
@@ -94,10 +94,10 @@ struct Counted {
 /// What the scanner is like now, where no frame tells.
 pub(super) struct Here {
     pub state: scan::State,
-    pub baud: u32,
+    pub baud: Option<u32>,
     pub health: [Health; SEGMENT_COUNT],
     pub counters: Counters,
-    pub link: sc18im::Counters,
+    pub link: Option<sc18im::Counters>,
     pub ids: [Option<UniqueId>; SEGMENT_COUNT],
 }
 
@@ -238,10 +238,10 @@ mod tests {
     fn here() -> Here {
         Here {
             state: scan::State::Scanning,
-            baud: 115_200,
+            baud: Some(115_200),
             health: [Health::Good; SEGMENT_COUNT],
             counters: Counters::default(),
-            link: sc18im::Counters::default(),
+            link: None,
             ids: [None; SEGMENT_COUNT],
         }
     }

@@ -5,7 +5,8 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::SyncSender;
 
 use bridge::Platform;
-use glove::scan::{Config, Scanner};
+use glove::bus::Bus as _;
+use glove::scan::BusScanner;
 use glove::{Duration, Instant};
 
 use super::shared::{Scanned, Shared};
@@ -13,7 +14,7 @@ use super::snapshot::Here;
 use crate::clock::{Clock, since};
 use crate::interrupt::Interrupt;
 use crate::lines::Pc;
-use crate::lines::port::Port;
+use crate::lines::glove::{GloveBus, GloveLine, Reading};
 
 /// The longest wait: an end is heard within it.
 const LONGEST: Duration = Duration::from_millis(20);
@@ -22,7 +23,7 @@ const SAY: Duration = Duration::from_millis(50);
 
 pub(super) struct Worker {
     pc: Pc,
-    scanner: Scanner<Port>,
+    scanner: BusScanner<GloveBus>,
     hand: SyncSender<Scanned>,
     shared: Arc<Shared>,
     said: Option<Instant>,
@@ -30,16 +31,16 @@ pub(super) struct Worker {
 
 impl Worker {
     pub fn new(
-        port: Port,
-        config: Config,
+        line: GloveLine,
+        reading: Reading,
         clock: Clock,
         interrupt: &Interrupt,
         hand: SyncSender<Scanned>,
         shared: Arc<Shared>,
     ) -> Self {
         Self {
-            pc: Pc::new(clock, [port.watch()], interrupt.clone()),
-            scanner: Scanner::new(port, config).with_set_baud(),
+            pc: Pc::new(clock, [line.watch()], interrupt.clone()),
+            scanner: line.scanner(reading),
             hand,
             shared,
             said: None,
@@ -77,10 +78,10 @@ impl Worker {
     fn say(&mut self, now: Instant) {
         let here = Here {
             state: self.scanner.state(),
-            baud: self.scanner.baud(),
+            baud: self.scanner.bus_mut().line_baud(),
             health: self.scanner.health(),
             counters: *self.scanner.counters(),
-            link: *self.scanner.link_counters(),
+            link: self.scanner.bus_mut().link_counters().copied(),
             ids: self.scanner.ids(),
         };
         let shared = Arc::clone(&self.shared);

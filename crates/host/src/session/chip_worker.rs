@@ -367,6 +367,7 @@ impl Worker {
             profile: self.devices.profile(),
             headings: self.devices.headings(),
             ids: [None; glove::hand::SEGMENT_COUNT],
+            glove_baud: None,
             frame_sequence: newest.map_or(0, |sample| sample.frame_sequence),
             on_chip: true,
             frame: None,

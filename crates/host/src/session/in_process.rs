@@ -9,7 +9,7 @@ use anyhow::Result;
 use bridge::{App, Board, SafeAction, WeightsStore};
 use glove::calibration::Bound;
 use glove::hand::Side;
-use glove::scan;
+use glove::imu::Mode;
 use gripper::driver::{ThreeFinger, TwoFinger};
 
 use super::Session;
@@ -22,8 +22,8 @@ use super::worker::{PcApp, Worker};
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
-use crate::lines::glove::{GloveBus, GloveLine};
-use crate::lines::port::{BAUD, Watch};
+use crate::lines::glove::{GloveBus, GloveLine, Reading};
+use crate::lines::port::Watch;
 use crate::lines::{Line, Model, Pc, Settings};
 use crate::next::{Command, advice};
 use crate::realtime::{self, Scheduling};
@@ -33,6 +33,8 @@ use crate::realtime::{self, Scheduling};
 pub struct Parts {
     /// The way to the glove.
     pub glove: GloveLine,
+    /// How it is read.
+    pub reading: Reading,
     /// The gripper's line.
     pub gripper: Line,
     /// Which gripper it is.
@@ -65,10 +67,11 @@ pub struct Driving {
 }
 
 impl Driving {
-    fn settings<const X: usize>(&self, side: Side) -> bridge::Settings<X> {
+    fn settings<const X: usize>(&self, side: Side, mode: Mode) -> bridge::Settings<X> {
         let usual = bridge::Settings::<X>::default();
         bridge::Settings {
             side,
+            heading_is_relative: mode == Mode::Imu,
             speed: self.speed.map_or(usual.speed, |speed| [speed; X]),
             force: self.force.map_or(usual.force, |force| [force; X]),
             rate: self.rate.unwrap_or(usual.rate),
@@ -113,7 +116,7 @@ impl InProcess {
         Pc: Board<X, Glove = GloveBus, Flash = MemorySlot>,
     {
         let store = stored(&parts.image, parts.model)?;
-        let settings = parts.driving.settings::<X>(parts.side);
+        let settings = parts.driving.settings::<X>(parts.side, parts.reading.mode);
         let config = bridge::Config::new(settings)
             .or_fail(|| "the bridge's settings".to_owned(), "others")?;
         let (orders, queue) = Orders::queue(clock);
@@ -127,15 +130,12 @@ impl InProcess {
         let mut worker = Worker::new(queue, hub.clone(), parts.feed);
         let line = parts.gripper.driver_config(parts.line);
         let (glove, gripper, profile) = (parts.glove, parts.gripper, parts.profile);
+        let reading = parts.reading;
         let bridge = std::thread::Builder::new().name("bridge".to_owned());
         let (tell_scheduling, scheduling) = std::sync::mpsc::sync_channel(1);
         let start = move || {
             bridge.spawn(move || {
-                let scan = scan::Config {
-                    baud: BAUD,
-                    ..scan::Config::default()
-                };
-                let scanner = glove.scanner(scan);
+                let scanner = glove.scanner(reading);
                 let gripper = driver(gripper, line);
                 let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);
                 if let Some(profile) = &profile {
@@ -271,7 +271,7 @@ mod driving_tests {
 
     #[test]
     fn what_is_not_said_of_driving_is_as_usual_and_what_is_said_counts_for_every_axis() {
-        let usual = Driving::default().settings::<4>(Side::Left);
+        let usual = Driving::default().settings::<4>(Side::Left, Mode::Imu);
         let expected = bridge::Settings {
             side: Side::Left,
             ..bridge::Settings::<4>::default()
@@ -283,9 +283,10 @@ mod driving_tests {
             rate: Some(100.0),
             safe_action: Some(SafeAction::OpenSlowly),
         };
-        let settings = driving.settings::<4>(Side::Right);
+        let settings = driving.settings::<4>(Side::Right, Mode::Ndof);
         assert_eq!((settings.speed, settings.force), ([90; 4], [0; 4]));
         assert_eq!(settings.safe_action, SafeAction::OpenSlowly);
+        assert!(!settings.heading_is_relative, "a compass has one heading");
         assert!(bridge::Config::new(settings).is_ok());
     }
 }

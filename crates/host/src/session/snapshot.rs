@@ -104,6 +104,8 @@ pub struct Snapshot {
     pub headings: Option<Headings>,
     /// The sensors' unique ids, as they are wired, as far as they were read; none from a chip.
     pub ids: [Option<UniqueId>; SEGMENT_COUNT],
+    /// Speed of the glove's serial line, baud; `None` on an I²C port and from a bridge on a chip.
+    pub glove_baud: Option<u32>,
     /// Counts frames taken; 0: none yet.
     pub frame_sequence: u32,
     /// Whether the bridge runs on a chip, of which no events come.
@@ -201,6 +203,7 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
                 pose: now.pose,
             }),
             ids: [None; SEGMENT_COUNT],
+            glove_baud: None,
             frame_sequence: now.frame_sequence,
             on_chip: false,
             frame: now.frame,
@@ -237,6 +240,7 @@ impl Snapshot {
             profile: Some(ProfileState::default()),
             headings: None,
             ids: [None; SEGMENT_COUNT],
+            glove_baud: None,
             frame_sequence: 1,
             on_chip: false,
             frame: None,

@@ -3,6 +3,7 @@
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
 use bridge::{App, Board, Epoch, HoldReason, State, Telemetry};
+use glove::bus::Bus as _;
 use gripper::driver::{ThreeFinger, TwoFinger};
 use gripper::{Activation, Instant, Status};
 
@@ -210,6 +211,7 @@ impl Worker {
             .here(&telemetry.counters, telemetry.now, self.scheduling);
         let seen = Snapshot {
             ids: app.scanner_mut().ids(),
+            glove_baud: app.scanner_mut().bus_mut().line_baud(),
             ..Snapshot::from(&telemetry)
         };
         said.say(seen, useless);

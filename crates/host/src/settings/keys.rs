@@ -2,10 +2,11 @@
 
 use super::value::Value;
 use crate::lines::Model;
+use crate::lines::glove::RAISED;
 use crate::next::{Command, NextStep, advice};
 
 /// The file's sections, in its order.
-pub const SECTIONS: [&str; 4] = ["glove", "gripper", "teleop", "keys"];
+pub const SECTIONS: [&str; 5] = ["glove", "gripper", "bridge", "teleop", "keys"];
 
 /// What a value may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -14,6 +15,8 @@ pub enum Kind {
     Text,
     /// One of these.
     Choice(&'static [&'static str]),
+    /// One of these numbers.
+    OneOf(&'static [i64]),
     /// A whole number in this range.
     Whole(i64, i64),
     /// A key of the keyboard: a printable character, or `space`.
@@ -61,19 +64,43 @@ const MODELS: &[&str] = &{
     [a.option(), b.option(), c.option(), d.option()]
 };
 
+/// The speeds of a glove's line, as they stand in a file.
+const GLOVE_BAUDS: [i64; RAISED.len()] = {
+    let [a, b, c] = RAISED;
+    [a as i64, b as i64, c as i64]
+};
+
 /// All of them.
 pub const KEYS: &[Key] = &[
     open(
         "glove.port",
         Kind::Text,
         "\"/dev/ttyUSB0\"",
-        "The glove's serial port (--glove).",
+        "The glove's serial port, or i2c:/dev/i2c-N (--glove).",
     ),
     open(
         "glove.hand",
         Kind::Choice(&["right", "left"]),
         "\"right\"",
         "Which hand wears the glove (--hand): right or left; a calibration that finds the other one is refused.",
+    ),
+    key(
+        "glove.baud",
+        Kind::OneOf(&GLOVE_BAUDS),
+        "460800",
+        "Highest speed of its serial line (--glove-baud): it is raised to the highest up to this one that answers without errors.",
+    ),
+    key(
+        "glove.status_check",
+        Kind::Choice(&["on", "off"]),
+        "\"on\"",
+        "Whether its serial bridge is asked after each read how it went (--status-check).",
+    ),
+    key(
+        "glove.mode",
+        Kind::Choice(&["imu", "ndof"]),
+        "\"imu\"",
+        "Which fusion its sensors run (--sensor-mode): imu, or ndof, which has a compass and is worse near metal.",
     ),
     open(
         "gripper.port",
@@ -130,6 +157,12 @@ pub const KEYS: &[Key] = &[
         "After half a second without data or a heartbeat (--safe-action): hold, or open-slowly.",
     ),
     open(
+        "bridge.port",
+        Kind::Text,
+        "\"/dev/ttyACM0\"",
+        "Where a bridge on a chip is (--bridge): a serial port, unix:PATH or tcp:HOST:PORT.",
+    ),
+    open(
         "teleop.model",
         Kind::Text,
         "\"model.safetensors\"",
@@ -181,7 +214,7 @@ impl Key {
     pub fn default(&self) -> Option<Value> {
         match self.kind {
             _ if self.default.is_empty() => None,
-            Kind::Whole(..) => self.default.parse().ok().map(Value::Whole),
+            Kind::Whole(..) | Kind::OneOf(_) => self.default.parse().ok().map(Value::Whole),
             _ => Some(Value::Text(self.default.trim_matches('"').to_owned())),
         }
     }
@@ -205,6 +238,14 @@ impl Key {
             (Kind::Whole(least, most), _) => Err(format!(
                 "{name} = {shown:.60} is no whole number from {least} to {most}"
             )),
+            (Kind::OneOf(numbers), toml::Value::Integer(number)) if numbers.contains(number) => {
+                Ok(Value::Whole(*number))
+            }
+            (Kind::OneOf(numbers), _) => {
+                let numbers: Vec<String> = numbers.iter().map(i64::to_string).collect();
+                let numbers = numbers.join(", ");
+                Err(format!("{name} = {shown:.60} is none of {numbers}"))
+            }
             (Kind::Text, toml::Value::String(text)) if !text.is_empty() => {
                 Ok(Value::Text(text.clone()))
             }

@@ -90,6 +90,10 @@ fn a_value_out_of_its_range_is_refused_with_key_value_and_range() {
             "[gripper]\nmodel = \"4f\"",
             "gripper.model = \"4f\" is none of 3f, 2f85",
         ),
+        (
+            "[glove]\nbaud = 57600",
+            "glove.baud = 57600 is none of 115200, 230400, 460800",
+        ),
         ("[glove]\nport = \"\"", "glove.port = \"\" is no text"),
         ("[glove]\nport = 7", "glove.port = 7 is no text"),
         ("[keys]\nend = \"qq\"", "keys.end = \"qq\" is no key"),

@@ -16,12 +16,62 @@ const TRIALS: usize = 6;
 /// Steps of a trial that count, after one with each batch: the first visit of a batch looks for every neighbour anew.
 const COUNTED: usize = 5;
 
+/// What a step costs, without and with attraction. Knows no clock: times are arguments.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pace {
+    /// Seconds a step, and how many steps that was measured on.
+    seconds: [f64; 2],
+    steps: [usize; 2],
+}
+
+/// Steps that are still to do.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Ahead {
+    without: usize,
+    with: usize,
+    /// The map settles meanwhile.
+    settles: bool,
+}
+
+impl Pace {
+    /// With what one step of each kind took.
+    fn new(seconds: [f64; 2]) -> Self {
+        Self {
+            seconds,
+            steps: [0; 2],
+        }
+    }
+
+    /// A step took so many seconds.
+    fn step(&mut self, attracts: bool, seconds: f64) {
+        let with = usize::from(attracts);
+        // A pause for a person's answer is not the step's time: take no more than ten times the usual.
+        let seconds = seconds.min(10.0 * self.seconds[with]);
+        self.steps[with] += 1;
+        let share = (1.0 / self.steps[with] as f64).max(LEAST_SHARE);
+        self.seconds[with] += share * (seconds - self.seconds[with]);
+    }
+
+    /// Steps with attraction were tried, and took so many seconds each.
+    fn tried(&mut self, trial: &mut [f64]) {
+        // The middle one: another program may have had the processor meanwhile.
+        trial.sort_by(f64::total_cmp);
+        if let Some(middle) = trial.get(trial.len() / 2) {
+            self.seconds[1] = *middle;
+        }
+    }
+
+    /// Seconds that are left.
+    fn left(&self, ahead: &Ahead) -> f64 {
+        let settles = if ahead.settles { SETTLES } else { 1.0 };
+        ahead.without as f64 * self.seconds[0] + settles * ahead.with as f64 * self.seconds[1]
+    }
+}
+
 /// Estimates the time left, from the time of the steps so far, with and without attraction.
 pub(super) struct Clock {
     last: Instant,
-    /// Seconds a step, without and with attraction, and how many steps they were measured on.
-    seconds: [f64; 2],
-    steps: [usize; 2],
+    pace: Pace,
     /// The epoch after which the next trial begins.
     next_trial: usize,
     /// Seconds of the trial that is going on.
@@ -38,8 +88,7 @@ impl Clock {
         let seconds = [none, full].map(|weights| evaluation(trainer, &weights, 0));
         Self {
             last: Instant::now(),
-            seconds,
-            steps: [0; 2],
+            pace: Pace::new(seconds),
             next_trial: trainer.epoch,
             trial: Vec::new(),
         }
@@ -48,14 +97,8 @@ impl Clock {
     /// A step was done.
     pub(super) fn tick(&mut self, trainer: &Trainer) {
         let now = Instant::now();
-        let with = usize::from(trainer.weights(trainer.epoch.saturating_sub(1)).attraction != 0.0);
-        // A pause for a person's answer is not the step's time: take no more than ten times the usual.
-        let elapsed = (now - self.last)
-            .as_secs_f64()
-            .min(10.0 * self.seconds[with]);
-        self.steps[with] += 1;
-        let share = (1.0 / self.steps[with] as f64).max(LEAST_SHARE);
-        self.seconds[with] += share * (elapsed - self.seconds[with]);
+        let attracts = trainer.weights(trainer.epoch.saturating_sub(1)).attraction != 0.0;
+        self.pace.step(attracts, (now - self.last).as_secs_f64());
         self.last = now;
     }
 
@@ -70,10 +113,7 @@ impl Clock {
         let seconds = evaluation(trainer, &last, trainer.epoch % batches);
         self.trial.push(seconds);
         if self.trial.len() == batches + COUNTED {
-            // The middle one: another program may have had the processor meanwhile.
-            let counted = &mut self.trial[batches..];
-            counted.sort_by(f64::total_cmp);
-            self.seconds[1] = counted[COUNTED / 2];
+            self.pace.tried(&mut self.trial[batches..]);
             self.trial.clear();
             self.next_trial = trainer.epoch + trainer.total() / TRIALS;
         }
@@ -94,14 +134,12 @@ impl Clock {
         } else {
             0
         };
-        let without = total - trainer.epoch - with;
         let cooling = trainer.plan.cooling_epochs;
-        let settles = if cooling > 0 && with > cooling / 2 {
-            SETTLES
-        } else {
-            1.0
-        };
-        let seconds = without as f64 * self.seconds[0] + settles * with as f64 * self.seconds[1];
+        let seconds = self.pace.left(&Ahead {
+            without: total - trainer.epoch - with,
+            with,
+            settles: cooling > 0 && with > cooling / 2,
+        });
         Duration::try_from_secs_f64(seconds).unwrap_or_default()
     }
 }
@@ -111,4 +149,108 @@ fn evaluation(trainer: &mut Trainer, weights: &Weights, batch: usize) -> f64 {
     let start = Instant::now();
     let _ = trainer.engine.evaluate(weights, batch);
     start.elapsed().as_secs_f64()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A training of 1,000 steps without attraction and 2,000 with it.
+    const WITHOUT: usize = 1_000;
+    const WITH: usize = 2_000;
+    const COST: [f64; 2] = [0.002, 0.008];
+
+    /// What each step takes where nothing comes between, seconds: with attraction less and less, where the map settles. From step to
+    /// step it varies by up to a fifth either way.
+    fn times(settles: bool) -> Vec<f64> {
+        let mut random = 1u64;
+        let mut vary = |seconds: f64| {
+            random = random
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            seconds * (0.8 + 0.4 * (random >> 33) as f64 / f64::from(1u32 << 31))
+        };
+        let end = 2.0 * SETTLES - 1.0;
+        let cost = |k: usize| match k.checked_sub(WITHOUT) {
+            None => COST[0],
+            Some(k) if settles => COST[1] * (1.0 + (end - 1.0) * k as f64 / WITH as f64),
+            Some(_) => COST[1],
+        };
+        (0..WITHOUT + WITH).map(|k| vary(cost(k))).collect()
+    }
+
+    /// After each step: the share of the time that has passed, what is said to be left, and what is. `felt` is what a step of so many
+    /// seconds takes with all that comes between.
+    fn told(settles: bool, felt: impl Fn(usize, f64) -> f64) -> Vec<(f64, f64, f64)> {
+        let bare = times(settles);
+        let real: Vec<f64> = bare.iter().enumerate().map(|(k, &t)| felt(k, t)).collect();
+        let all: f64 = real.iter().sum();
+        // The first of each are dear: no neighbour is known yet.
+        let mut pace = Pace::new([5.0 * COST[0], 3.0 * COST[1]]);
+        let (mut passed, mut told) = (0.0, Vec::new());
+        for (k, seconds) in real.iter().enumerate() {
+            pace.step(k >= WITHOUT, *seconds);
+            // A trial now and then, before such steps come; one of its steps was kept waiting.
+            if k % (WITHOUT + WITH).div_ceil(TRIALS) == 10 && k < WITHOUT {
+                let slow = felt(k, COST[1]);
+                pace.tried(&mut [slow, 9.0 * slow, slow, 1.1 * slow, 0.9 * slow]);
+            }
+            passed += seconds;
+            let ahead = Ahead {
+                without: WITHOUT.saturating_sub(k + 1),
+                with: WITH.min(WITHOUT + WITH - k - 1),
+                settles: settles && k < WITHOUT + WITH / 2,
+            };
+            told.push((passed / all, pace.left(&ahead), all - passed));
+        }
+        told
+    }
+
+    fn within_a_fifth(told: &[(f64, f64, f64)], from: f64, to: f64) {
+        let asked = told.iter().filter(|(share, ..)| (from..to).contains(share));
+        for (share, said, left) in asked {
+            let ratio = said / left;
+            assert!(
+                (0.8..=1.2).contains(&ratio),
+                "at {share:.2}: {said} s, and it was {left} s"
+            );
+        }
+    }
+
+    #[test]
+    fn after_a_third_what_is_left_is_told_within_a_fifth() {
+        for settles in [false, true] {
+            within_a_fifth(&told(settles, |_, seconds| seconds), 1.0 / 3.0, 0.95);
+        }
+    }
+
+    #[test]
+    fn long_before_the_dear_steps_come_their_cost_is_told_too() {
+        let told = told(true, |_, seconds| seconds);
+        within_a_fifth(&told, 0.02, 1.0 / 3.0);
+    }
+
+    #[test]
+    fn a_machine_that_was_busy_at_first_and_a_person_who_took_a_minute_are_forgotten_by_then() {
+        let busy = |k: usize, seconds: f64| match k {
+            0..400 => 3.0 * seconds,
+            _ => seconds,
+        };
+        within_a_fifth(&told(true, busy), 1.0 / 3.0, 0.95);
+        // Their minute is none of the training's own time.
+        let pause = told(true, |k, seconds| {
+            seconds + if k == 1_100 { 60.0 } else { 0.0 }
+        });
+        let after: Vec<_> = pause[1_300..2_800].to_vec();
+        within_a_fifth(&after, 0.0, 1.0);
+    }
+
+    #[test]
+    fn a_machine_that_becomes_twice_as_slow_is_followed_within_a_hundred_steps() {
+        let told = told(
+            false,
+            |k, seconds| if k < 1_500 { seconds } else { 2.0 * seconds },
+        );
+        within_a_fifth(&told[1_600..2_800], 0.0, 1.0);
+    }
 }

@@ -7,6 +7,7 @@ use glove::hand::Side;
 
 use crate::commands::glove::GloveAt;
 use crate::commands::teleop::Hand as WhichHand;
+use crate::options::ReadingOptions;
 use host::chip::link::Address;
 
 /// Options of `calibrate`.
@@ -26,7 +27,7 @@ The profile goes into a file bound to the sensors' unique ids, where `teleop` fi
 It is written when every check holds or leaves doubts; what is bad is not, but with --keep-anyway. \
 A virtual glove's person does what is asked by itself (`gauntlet simulate`). Exit code 1 where nothing is kept.")]
 pub struct Calibrate {
-    /// The glove's serial port; needed but for --bridge and --list.
+    /// The glove's serial port, or `i2c:/dev/i2c-N`; needed but for --bridge and --list.
     #[arg(long, value_name = "PORT")]
     pub glove: Option<PathBuf>,
     /// The glove of the bridge on a chip there: a serial port, unix:PATH or tcp:HOST:PORT. The bridge keeps the profile, too.
@@ -53,6 +54,9 @@ pub struct Calibrate {
     /// List the profiles that are there; no glove is needed.
     #[arg(long)]
     pub list: bool,
+    /// How the glove is read.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
@@ -66,6 +70,7 @@ impl Calibrate {
             profile: self.profile.clone(),
             ideal: false,
             hand: self.hand.unwrap_or(WhichHand::Right),
+            reading: self.reading,
             json: self.json,
         }
     }

@@ -18,6 +18,7 @@ use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::next::Command;
 use host::scanning::{Scanned, Scanning};
+use host::words;
 
 /// For the sensors of a chip that has just started.
 const SENSORS_WAIT: Duration = Duration::from_secs(15);
@@ -166,10 +167,10 @@ impl Source {
         match self {
             Self::Port { scanning, .. } => scanning.snapshot().map_or_else(String::new, |seen| {
                 format!(
-                    "{} of 16 sensors, {:.1} scans/s, {} baud",
+                    "{} of 16 sensors, {:.1} scans/s, {}",
                     seen.good(),
                     seen.rate,
-                    seen.baud
+                    words::line_speed(seen.baud)
                 )
             }),
             Self::Chip { scans, .. } => {

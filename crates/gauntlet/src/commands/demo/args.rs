@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::options::{model_parser, run_time};
+use crate::options::{ReadingOptions, model_parser, run_time};
 use host::lines::Model;
 
 /// Options of `demo`.
@@ -43,6 +43,9 @@ pub struct Demo {
     /// Which gripper follows the hand.
     #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
     pub gripper_model: Model,
+    /// How the glove is read; with --on-chip the chip's firmware says that.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// Sensors that sit straight and share one heading, as no real ones do: nobody needs to be calibrated.
     #[arg(long)]
     pub ideal: bool,
@@ -73,6 +76,7 @@ impl Default for Demo {
             seed: 1,
             no_start_pairs: false,
             gripper_model: Model::ThreeFinger,
+            reading: ReadingOptions::default(),
             ideal: false,
             calibrate: false,
             profile: None,

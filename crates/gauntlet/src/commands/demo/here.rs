@@ -9,10 +9,7 @@ use super::parts::{self, Stage, Started, Virtual};
 use super::person;
 use crate::progress::Person;
 use crate::run::{LogTo, Run};
-use crate::tell::Tell;
 use host::clock::Clock;
-use host::interrupt::Interrupt;
-use host::lines::Model;
 use host::lines::port::BAUD;
 use host::probe;
 use host::session::record::Feed;
@@ -40,7 +37,7 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     let model = options.gripper_model;
     let log = options.log.clone();
     let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
-    let parts = opened(&devices, model, image, feed, tell, interrupt)?;
+    let parts = opened(stage, &devices, image, feed)?;
     let session = InProcess::start(parts, clock, interrupt)?;
     tell.say(format_args!(
         "weights    an image of {length} bytes is stored and checked in the bridge's weights store"
@@ -51,6 +48,7 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
         run,
         outcome,
         person,
+        drives: None,
         flashed: None,
         home: Box::new(devices),
         framed: |seen| seen.frame_sequence > 0,
@@ -60,22 +58,29 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
 
 /// Opens the ports to both devices.
 fn opened(
+    stage: Stage<'_>,
     devices: &Virtual,
-    model: Model,
     image: Vec<u8>,
     feed: Option<Feed>,
-    tell: &Tell,
-    interrupt: &Interrupt,
 ) -> Result<Parts> {
+    let Stage {
+        options,
+        tell,
+        interrupt,
+        ..
+    } = stage;
+    let model = options.gripper_model;
     let (glove, gripper) = (devices.glove_port.path(), devices.gripper_port.path());
     tell.say(format_args!(
-        "devices    virtual glove on {}, virtual gripper on {}, {BAUD} baud",
+        "devices    virtual glove on {}, to be raised to {} baud, virtual gripper on {}, {BAUD} baud",
         glove.display(),
+        options.reading.glove_baud,
         gripper.display()
     ));
     let (gripper, _) = probe::open_gripper(gripper, model, &Person, interrupt)?;
     Ok(Parts {
         glove: probe::open_glove(glove, interrupt)?.port.into(),
+        reading: options.reading.given(),
         gripper,
         model,
         line: host::lines::Settings::default(),

@@ -6,6 +6,8 @@ mod on_chip;
 mod parts;
 mod person;
 
+use std::time::Instant;
+
 use anyhow::Result;
 
 use crate::progress::Person;
@@ -27,6 +29,7 @@ pub use args::Demo;
 /// # Errors
 /// A failure that says which of its steps did not succeed.
 pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
+    let begun = Instant::now();
     let tell = Tell::new(options.json);
     // Whose keys are not known is refused before anything is trained or moves.
     Settings::load()?;
@@ -50,6 +53,7 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         interrupt,
     })?;
     let driven = drive(options, &mut started, &tell);
+    let prepared = started.drives.map(|at| (at - begun).as_secs_f64());
     let Started {
         run,
         outcome,
@@ -60,8 +64,10 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     } = started;
     let mut finished = run.finish();
     drop(home);
+    let first = finished.summary.first_motion_s.zip(prepared);
+    let first = first.map(|(after, before)| ((before + after) * 10.0).round() / 10.0);
     if !options.json || finished.ending.is_none() {
-        say(&finished, &outcome.quality.line(), &tell);
+        say(&finished, first, &outcome.quality.line(), &tell);
     }
     let moved = finished.summary.first_motion_s.is_some();
     let judgement = finished.judge(driven).and_then(|end| match end {
@@ -78,6 +84,7 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             quality: &outcome.quality,
             person: person.as_ref(),
             flash: flashed.as_ref(),
+            first_motion_from_start_s: first,
             run: finished.result(failure),
         };
         results::print("demo", result)?;
@@ -109,6 +116,7 @@ fn drive(options: &Demo, started: &mut Started, tell: &Tell) -> Result<End> {
         "engaged    the gripper follows the hand for {} (Ctrl-C holds it and ends)",
         seconds(options.seconds)
     ));
+    started.drives = Some(Instant::now());
     run.drive(&Options {
         title: match options.on_chip {
             true => "gauntlet demo --on-chip",
@@ -122,11 +130,11 @@ fn drive(options: &Demo, started: &mut Started, tell: &Tell) -> Result<End> {
 }
 
 /// What the demo says at its end.
-fn say(finished: &Finished, map: &str, tell: &Tell) {
+fn say(finished: &Finished, first: Option<f64>, map: &str, tell: &Tell) {
     finished.tell(tell, "summary    ");
-    if let Some(first) = finished.summary.first_motion_s {
+    if let (Some(after), Some(all)) = (finished.summary.first_motion_s, first) {
         tell.say(format_args!(
-            "motion     the gripper first moved with the hand {first:.1} s after the clutch was closed"
+            "motion     the gripper first moved with the hand {after:.1} s after the clutch was closed, {all:.1} s after the start"
         ));
     }
     if finished.ending.is_some() {

@@ -13,7 +13,6 @@ use host::chip::emulator::{Emulator, Setup, find_firmware};
 use host::failure::Failure;
 use host::lines::Model;
 use host::next::Command;
-use host::probe;
 use host::session::Devices;
 use host::training::model;
 
@@ -52,8 +51,6 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     stage.introduce("the bridge is its ARM firmware in QEMU");
     let devices = Virtual::start(stage)?;
     let profile = person::profile(stage, &devices)?;
-    // The emulated line has one speed.
-    drop(probe::open_glove(devices.glove_port.path(), interrupt)?);
     let mut emulator = Emulator::new(Setup {
         firmware,
         glove: Some(devices.glove_port.path().to_owned()),
@@ -75,6 +72,7 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
         run,
         outcome,
         person,
+        drives: None,
         flashed: Some(flashed),
         home: Box::new((emulator, devices)),
         framed: |seen| seen.glove_answers,

@@ -1,7 +1,7 @@
 //! What both homes of the demo's bridge share: the trained map, the virtual devices, what was started.
 
 use std::any::Any;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use glove::calibration::Bound;
@@ -62,6 +62,8 @@ pub(super) struct Started {
     pub(super) outcome: Outcome,
     /// Who wears the glove; `None` with ideal sensors.
     pub(super) person: Option<runs::Person>,
+    /// When driving began.
+    pub(super) drives: Option<Instant>,
     /// How the map came into a chip.
     pub(super) flashed: Option<Flashed>,
     /// Devices and emulator: gone when this is dropped.

@@ -103,7 +103,10 @@ fn shown(stage: Stage<'_>, devices: &Virtual) -> Result<(Bound, Person)> {
     let clock = Clock::start();
     let BringUp { scanning, .. } = scanning::open(
         devices.glove_port.path(),
-        Settings::default(),
+        Settings {
+            reading: options.reading.given(),
+            ..Settings::default()
+        },
         clock,
         interrupt,
     )?;

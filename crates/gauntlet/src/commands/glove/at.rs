@@ -6,21 +6,23 @@ use anyhow::Result;
 use clap::Args;
 use glove::hand::Side;
 
+use super::speed;
 use crate::commands::teleop::Hand as WhichHand;
+use crate::options::ReadingOptions;
 use crate::tell::Tell;
 use host::calibration::{may_be_ideal, profile_of};
 use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::lines::list;
-use host::lines::port::BAUD;
 use host::next::Command;
 use host::scanning::{self, BringUp, Hand, Scanning, Settings};
+use host::words;
 
 /// Where the glove is, and what is known of it.
 #[derive(Debug, Clone, Args)]
 pub struct GloveAt {
-    /// The glove's serial port.
+    /// The glove's serial port, or `i2c:/dev/i2c-N`.
     #[arg(long, value_name = "PORT")]
     pub glove: PathBuf,
     /// The glove's profile, if not the one that is found by its sensors' ids.
@@ -32,6 +34,9 @@ pub struct GloveAt {
     /// Which hand wears the glove, where no profile says.
     #[arg(long, value_enum, default_value_t = WhichHand::Right)]
     pub hand: WhichHand,
+    /// How it is read.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
@@ -80,24 +85,24 @@ impl GloveAt {
         if let Some(warning) = list::latency_warning(&self.glove) {
             tell.say(format_args!("warning: {place}: {warning}"));
         }
+        let settings = Settings {
+            reading: self.reading.given(),
+            ..Settings::default()
+        };
         let BringUp {
             scanning,
-            switched,
+            found,
             missing,
-        } = scanning::open(&self.glove, Settings::default(), clock, interrupt)?;
-        if let Some(baud) = switched {
-            let why = match baud {
-                9_600 => "as after power-on",
-                _ => "where it was left",
-            };
-            tell.say(format_args!(
-                "glove    {place}  spoke {baud} baud, {why}; switched it to {BAUD}"
-            ));
-        }
-        let good = scanning.snapshot().map_or(0, |seen| seen.good());
+        } = scanning::open(&self.glove, settings, clock, interrupt)?;
+        speed::found(tell, &self.glove, found);
+        let seen = scanning.snapshot();
+        let good = seen.as_ref().map_or(0, |seen| seen.good());
+        let baud = seen.and_then(|seen| seen.baud);
         tell.say(format_args!(
-            "glove    {place}  answers, {good} of 16 sensors give orientations"
+            "glove    {place}  answers, {good} of 16 sensors give orientations, {}",
+            words::line_speed(baud)
         ));
+        speed::runs(tell, &self.glove, settings.reading, baud);
         for finding in &missing.0 {
             tell.say(format_args!("warning: {}", finding.what));
             if let Some(next) = &finding.next {

@@ -2,6 +2,7 @@
 
 mod at;
 mod flat;
+pub(in crate::commands) mod speed;
 mod watch;
 
 use anyhow::Result;

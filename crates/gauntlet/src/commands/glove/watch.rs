@@ -11,9 +11,9 @@ use glove::scan::{Health, State};
 
 use super::at::GloveAt;
 use crate::live::glove::{GloveView, Sensor};
-use crate::live::{Bindings, Finger, Key, Live};
+use crate::live::{Bindings, Finger, Key, Live, headings};
 use crate::options::run_time;
-use crate::results::{self, gloves};
+use crate::results::{self, gloves, headings as known};
 use crate::run::FLAT_WAIT;
 use crate::say;
 use crate::tell::Tell;
@@ -84,6 +84,7 @@ pub(super) fn run(options: &Watch, interrupt: &Interrupt) -> Result<()> {
             took_s: started.elapsed().as_secs_f64(),
             calibrated: watching.hand.is_calibrated(),
             scanned: gloves::Scanned::from(seen),
+            joints: watching.hand.headings().as_ref().map(known::joints),
             sensors: gloves::sensors(seen),
             found: watching.found,
             failure,
@@ -192,10 +193,11 @@ impl Watching {
             fingers: self.pose.as_ref().map(fingers).unwrap_or_default(),
             hand_age: (age >= OLD).then_some(age.as_secs_f32()),
             calibrated,
+            headings: headings::of(self.hand.headings()),
             sensors: seen.map(shown).unwrap_or_default(),
             scans_per_s: seen.map_or(0.0, |seen| seen.rate),
             jitter_us: seen.and_then(|seen| seen.jitter_us),
-            baud: seen.map_or(0, |seen| seen.baud),
+            baud: seen.and_then(|seen| seen.baud),
             faults: self.faults(seen, keys),
             keys: match (keys, &self.unknown) {
                 (true, None) => format!("{calibrate}: the hand lies flat   {end}: end"),

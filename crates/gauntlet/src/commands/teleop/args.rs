@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use crate::options::{DrivingOptions, LineOptions, model_parser, run_time};
+use crate::options::{DrivingOptions, LineOptions, ReadingOptions, model_parser, run_time};
 use host::lines::Model;
 
 /// Which hand wears the glove.
@@ -15,15 +15,6 @@ pub enum Hand {
     Right,
     /// The left hand.
     Left,
-}
-
-/// Whether something is done.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Switch {
-    /// It is.
-    On,
-    /// It is not.
-    Off,
 }
 
 /// Options of `teleop`.
@@ -69,8 +60,11 @@ pub struct Teleop {
     #[arg(long)]
     pub calibrate_flat: bool,
     /// Whether flat poses are found while the hand works, and correct what has drifted.
-    #[arg(long, value_enum, value_name = "ON|OFF", default_value_t = Switch::On)]
-    pub find_flat: Switch,
+    #[arg(long, value_enum, value_name = "ON|OFF", default_value_t = OnOff::On)]
+    pub find_flat: OnOff,
+    /// How the glove is read.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// How the gripper's line differs from that of a gripper as delivered.
     #[command(flatten)]
     pub line: LineOptions,

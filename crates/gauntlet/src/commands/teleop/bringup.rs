@@ -9,6 +9,7 @@ use glove::scan::Health;
 use gripper::Activation;
 
 use super::args::Teleop;
+use crate::commands::glove::speed;
 use crate::run::Run;
 use crate::tell::Tell;
 use host::calibration::virtual_person::VirtualPerson;
@@ -60,6 +61,7 @@ pub(super) fn prepare(
         return Ok(Prepared::NoFrames);
     }
     tell_missing(run, tell)?;
+    tell_speed(options, run, tell);
     find_profile(options, run, tell)?;
     if options.calibrate_flat && !run.calibrate(tell)? {
         return Ok(Prepared::Ended);
@@ -159,6 +161,20 @@ fn tell_missing(run: &mut Run, tell: &Tell) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// How fast its line runs now.
+fn tell_speed(options: &Teleop, run: &Run, tell: &Tell) {
+    let Some(baud) = run.snapshot().and_then(|seen| seen.glove_baud) else {
+        return;
+    };
+    let (path, reading) = (&options.glove, options.reading.given());
+    tell.say(format_args!(
+        "glove    {}  {}",
+        path.display(),
+        words::line_speed(Some(baud))
+    ));
+    speed::runs(tell, path, reading, Some(baud));
 }
 
 /// Why no frame came, once the glove's port is free.

@@ -8,6 +8,7 @@ use std::path::Path;
 use anyhow::Result;
 use glove::hand::Side;
 
+use crate::commands::glove::speed;
 use crate::outputs;
 use crate::progress::Person;
 use crate::results;
@@ -19,7 +20,6 @@ use host::clock::Clock;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::lines::list;
-use host::lines::port::BAUD;
 use host::next::{Command, NextStep};
 use host::probe;
 use host::session::{Devices, InProcess, Parts, check_image};
@@ -28,7 +28,7 @@ use host::words;
 
 use bringup::{Prepared, no_frames, prepare};
 
-pub use args::{Hand, Switch, Teleop};
+pub use args::{Hand, Teleop};
 
 /// Runs until its time is over or somebody ends it.
 ///
@@ -65,21 +65,13 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         words::activation(activation)
     ));
     let glove = probe::open_glove_line(&options.glove, interrupt)?;
-    if let Some(baud) = glove.switched {
-        let why = match baud {
-            9_600 => "as after power-on",
-            _ => "where it was left",
-        };
-        tell.say(format_args!(
-            "glove    {}  spoke {baud} baud, {why}; switched it to {BAUD}",
-            options.glove.display()
-        ));
-    }
+    speed::found(&tell, &options.glove, glove.found);
     let clock = Clock::start();
     let log = options.log.clone();
     let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
     let parts = Parts {
         glove: glove.line,
+        reading: options.reading.given(),
         gripper,
         model,
         line,
@@ -97,7 +89,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         settings: line,
     };
     let mut run = Run::new(session, log, clock, interrupt.clone(), devices);
-    run.finds_flat(options.find_flat == Switch::On)?;
+    run.finds_flat(options.find_flat == OnOff::On)?;
     run.has(VirtualPerson::at(&options.glove).map(Listener::There));
     let prepared = prepare(options, &mut run, &tell, activation);
     let frames = !matches!(prepared, Ok(Prepared::NoFrames));

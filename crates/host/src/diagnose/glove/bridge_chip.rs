@@ -8,8 +8,10 @@ use crate::lines::port::BAUD;
 
 /// The SC18IM's speed after power-on.
 pub const RESET_BAUD: u32 = 9_600;
+/// Where a session leaves it mostly.
+pub const FAST_BAUD: u32 = 460_800;
 /// Speeds it may have been left at, likeliest first.
-pub const BAUDS: [u32; 4] = [BAUD, RESET_BAUD, 460_800, 230_400];
+pub const BAUDS: [u32; 4] = [BAUD, FAST_BAUD, RESET_BAUD, 230_400];
 /// Read the register I2CStat: `R 0A P`.
 pub const READ_STATUS: [u8; 3] = [0x52, 0x0A, 0x50];
 /// Write the register I2CTO (09), 3 × 4.44 ms, on: else a bus that hangs keeps the bridge silent for ever.

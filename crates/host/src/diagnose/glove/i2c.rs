@@ -1,8 +1,9 @@
 //! A glove on an I²C port of this computer: port, multiplexer, sensors.
 
+use std::path::PathBuf;
+
 use glove::bus::{Batch, Error, Transaction};
 use glove::mux;
-use glove::scan::{BusScanner, Config};
 
 use super::bridge_chip::MULTIPLEXERS;
 use super::exchange::exchange;
@@ -10,6 +11,7 @@ use super::sensors;
 use crate::diagnose::Findings;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
+use crate::lines::glove::{GloveLine, Reading};
 use crate::lines::i2c::{self, Address, Port};
 use crate::next::{Command, NextStep, advice};
 
@@ -17,7 +19,7 @@ const HUNG_NEXT: &str = "a short on SDA or SCL, or a chip that holds them: switc
                          look again";
 
 /// Finds out which layer of the glove on the I²C port at `address` fails.
-pub fn glove(address: &Address, interrupt: &Interrupt) -> Findings {
+pub fn glove(address: &Address, reading: Reading, interrupt: &Interrupt) -> Findings {
     let mut findings = Findings::default();
     let mut port = match i2c::open(address) {
         Ok(port) => port,
@@ -40,18 +42,16 @@ pub fn glove(address: &Address, interrupt: &Interrupt) -> Findings {
                     "its address pins A0, A1 and A2 low",
                 );
             }
-            let config = Config {
-                mux: answers,
-                ..Config::default()
-            };
             let watch = port.watch();
-            sensors::sensors(
-                BusScanner::on(port, config),
-                answers,
-                watch,
-                &mut findings,
-                interrupt,
-            );
+            let scanner = GloveLine::I2c(port).scanner_at(reading, answers);
+            let place = PathBuf::from(address.to_string());
+            let glove = sensors::Examined {
+                place: &place,
+                mux: answers,
+                reading,
+                found: None,
+            };
+            sensors::sensors(scanner, &glove, watch, &mut findings, interrupt);
         }
         Err(_) if interrupt.asked() => findings.note("multiplexer", "interrupted", "again"),
         Err(error) => {
@@ -76,7 +76,7 @@ pub fn multiplexer_answers(
         Err(_) if interrupt.asked() => Err(Failure::interrupted("while the glove was looked for")),
         Err(error) => {
             let (_, what, _) = wrong(address, error);
-            let text = std::path::PathBuf::from(address.to_string());
+            let text = PathBuf::from(address.to_string());
             Err(Failure::new(
                 format!("no glove answers on {address}: {what}"),
                 Command::gauntlet("doctor").path("--glove", &text),
@@ -191,8 +191,15 @@ mod tests {
         let port = Port::over("i2c:/dev/i2c-9".into(), glove.i2c(&clock, 400_000));
         let port = port.expect("a thread");
         let (watch, mut findings) = (port.watch(), Findings::default());
-        let scanner = BusScanner::on(port, Config::default());
-        sensors::sensors(scanner, mux::ADDRESS, watch, &mut findings, &interrupt());
+        let scanner = GloveLine::I2c(port).scanner(Reading::default());
+        let place = PathBuf::from("i2c:/dev/i2c-9");
+        let glove = sensors::Examined {
+            place: &place,
+            mux: mux::ADDRESS,
+            reading: Reading::default(),
+            found: None,
+        };
+        sensors::sensors(scanner, &glove, watch, &mut findings, &interrupt());
         assert_eq!(findings.faults(), 1, "{findings:?}");
         let wrong = findings.first_wrong().expect("one");
         assert!(wrong.what.contains("channel 4, address 0x29"), "{wrong:?}");

@@ -1,54 +1,65 @@
 //! The 16 sensors: which of them give orientations, and how often.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use bridge::Platform;
 use glove::bus::Bus;
+use glove::calibration::Step;
 use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu;
 use glove::scan::{BusScanner, Health, State};
 
-use super::bridge_chip::RESET_BAUD;
-use super::own;
+use super::{own, worn};
+use crate::calibration::virtual_person::VirtualPerson;
 use crate::clock::Clock;
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;
 use crate::lines::Pc;
+use crate::lines::glove::Reading;
 use crate::lines::port::Watch;
+use crate::scanning::Scanned;
 
-/// All sensors are up 1.6 s after power-on, slower at 9600 baud.
+/// All sensors are up 1.6 s after power-on.
 const BRING_UP: Duration = Duration::from_secs(6);
-/// The same at 9600 baud.
-const BRING_UP_SLOW: Duration = Duration::from_secs(20);
 /// By so much later all sensors that fail in a step again and again are through with it.
 const STUBBORN: Duration = Duration::from_secs(12);
 /// Time for a sensor to come after the first frame.
 const STRAGGLERS: Duration = Duration::from_secs(2);
 /// For the noise and the drift of the sensors' headings: to about 1 °/min.
 const LYING: Duration = Duration::from_secs(3);
+/// A virtual person hears late, and takes its time.
+const SETTLES: Duration = Duration::from_secs(2);
 /// The longest wait between two looks.
 const LOOK: glove::Duration = glove::Duration::from_millis(1);
 
-/// Brings the sensors up behind the multiplexer at `mux`, and looks which of them give orientations.
+/// Which glove it is.
+#[derive(Debug, Clone, Copy)]
+pub struct Examined<'a> {
+    /// Where it is, as it was named.
+    pub place: &'a Path,
+    /// Address of its multiplexer.
+    pub mux: u8,
+    /// How it is read.
+    pub reading: Reading,
+    /// The speed its serial bridge was found at; `None` on an I²C port.
+    pub found: Option<u32>,
+}
+
+/// Brings the sensors up, and looks which of them give orientations, and how well.
 pub fn sensors<B: Bus>(
     mut scanner: BusScanner<B>,
-    mux: u8,
+    glove: &Examined<'_>,
     watch: Watch,
     findings: &mut Findings,
     interrupt: &Interrupt,
 ) {
     let mut pc = Pc::new(Clock::start(), [watch], interrupt.clone());
-    let baud = scanner.bus_mut().line_baud();
-    let layer = match baud {
+    let layer = match glove.found {
         Some(_) => "bridge",
         None => "bus",
     };
-    let time = if baud == Some(RESET_BAUD) {
-        BRING_UP_SLOW
-    } else {
-        BRING_UP
-    };
-    let mut end = Instant::now() + time;
+    let mut end = Instant::now() + BRING_UP;
     let longest = end + STUBBORN;
     let (mut frames, mut since) = (0_u32, Instant::now());
     let mut seen = [Seen::default(); SEGMENT_COUNT];
@@ -82,10 +93,19 @@ pub fn sensors<B: Bus>(
     }
     if frames > 1 {
         let rate = f64::from(frames - 1) / since.elapsed().as_secs_f64();
-        findings.good(layer, format!("{rate:.1} scans/s"));
+        let baud = scanner.bus_mut().line_baud();
+        let raised = match baud {
+            Some(baud) if glove.found != Some(baud) => format!(", set to {baud} baud"),
+            _ => String::new(),
+        };
+        findings.good(layer, format!("{rate:.1} scans/s{raised}"));
+        let place = glove.place.display().to_string();
+        if let Some(slow) = baud.and_then(|baud| glove.reading.slow(&place, baud)) {
+            findings.note(layer, slow.what, slow.next);
+        }
     }
     if matches!(scanner.state(), State::NoAnswer | State::Resync) {
-        let what = match baud {
+        let what = match glove.found {
             Some(_) => "the serial bridge answers one question and then falls silent",
             None => "the I2C port does not come back from a transaction",
         };
@@ -106,36 +126,58 @@ pub fn sensors<B: Bus>(
         unsteady(k, seen, findings);
     }
     if lasting.iter().all(|health| health.is_good()) {
-        let lying = watch_lying(&mut scanner, &mut pc, interrupt);
         let ids = scanner.ids();
-        own::tell(
-            &mut scanner.into_bus(),
-            mux,
-            &ids,
-            &lying,
-            findings,
-            interrupt,
-        );
+        let mut worn = worn::Worn::of(&ids, findings);
+        let lying = watch_lying(&mut scanner, &mut pc, &mut worn, glove.place, interrupt);
+        let mut bus = scanner.into_bus();
+        own::tell(&mut bus, glove.mux, &ids, &lying, findings, interrupt);
+        worn.tell(glove.place, findings);
     }
 }
 
-/// How the sensors are while nobody is asked to move.
+/// How the sensors are while nobody is asked to move; the virtual person of a simulated glove lays the hand flat.
 fn watch_lying<B: Bus>(
     scanner: &mut BusScanner<B>,
     pc: &mut Pc,
+    worn: &mut worn::Worn,
+    place: &Path,
     interrupt: &Interrupt,
 ) -> own::Lying {
     let mut lying = own::Lying::default();
-    let end = Instant::now() + LYING;
+    let person = VirtualPerson::at(place);
+    if let Some(person) = &person {
+        person.ask(Step::FirstFlat);
+    }
+    let settled = Instant::now()
+        + if person.is_some() {
+            SETTLES
+        } else {
+            Duration::ZERO
+        };
+    let end = settled + LYING;
+    worn.begin(pc.now(), LYING + SETTLES);
     while Instant::now() < end && !interrupt.asked() {
         let now = pc.now();
         match scanner.poll(now) {
-            Some(frame) => lying.take(&frame, now),
+            Some(frame) => {
+                if Instant::now() >= settled {
+                    lying.take(&frame, now);
+                }
+                worn.take(&Scanned {
+                    frame,
+                    at: now,
+                    starts: scanner.counters().starts,
+                    ids: scanner.ids(),
+                });
+            }
             None => {
                 let due = scanner.next_due().unwrap_or(now + LOOK);
                 pc.wait_until(due.clamp(now, now + LOOK));
             }
         }
+    }
+    if let Some(person) = &person {
+        person.let_go();
     }
     lying
 }
