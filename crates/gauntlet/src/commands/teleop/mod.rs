@@ -22,6 +22,7 @@ use host::lines::list;
 use host::lines::port::BAUD;
 use host::next::{Command, NextStep};
 use host::probe;
+use host::recording::Drawn;
 use host::session::{Devices, InProcess, Parts, check_image};
 use host::training::model;
 use host::words;
@@ -77,7 +78,11 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     }
     let clock = Clock::start();
     let log = options.log.clone();
-    let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
+    let drawn = Drawn {
+        side: side(options.hand),
+        gripper: model.kinematics(),
+    };
+    let (log, feed) = log.map(|path| LogTo::new(path, drawn)).unzip();
     let parts = Parts {
         glove: glove.line,
         gripper,
