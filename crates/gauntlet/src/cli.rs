@@ -60,7 +60,7 @@ pub enum Verb {
     Simulate(simulate::Simulate),
     /// Drive a gripper with a glove, through two serial ports.
     Teleop(teleop::Teleop),
-    /// Write a trained map into a file as the image that a bridge takes.
+    /// Write a trained map into a file as the image that a bridge takes, or a session log into tables.
     Export(export::Export),
     /// Write a trained map into a bridge that runs on a chip.
     Flash(flash::Flash),

@@ -22,7 +22,7 @@ use clutch::Clutch;
 use host::clock::Clock;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
-use host::recording::{QUEUE, SessionLog};
+use host::recording::{Drawn, QUEUE, SessionLog};
 use host::session::record::{self, Feed, Records, Sort};
 use host::session::{Devices, Driver, Ending, Order, Session, Snapshot};
 use host::settings::Settings;
@@ -68,17 +68,17 @@ pub enum End {
 #[derive(Debug)]
 pub struct LogTo {
     path: PathBuf,
-    axes: usize,
+    drawn: Drawn,
     records: Records,
 }
 
 impl LogTo {
-    /// At `path`, for a gripper with so many axes; and where its session hands the records.
-    pub fn new(path: PathBuf, axes: usize) -> (Self, Feed) {
+    /// At `path`, with such a hand and gripper drawn; and where its session hands the records.
+    pub fn new(path: PathBuf, drawn: Drawn) -> (Self, Feed) {
         let (feed, records) = record::queue(QUEUE);
         let log = Self {
             path,
-            axes,
+            drawn,
             records,
         };
         (log, feed)
@@ -310,7 +310,7 @@ impl Run {
             return Ok(());
         };
         self.log = Some(SessionLog::create(
-            &to.path, to.axes, self.clock, to.records,
+            &to.path, to.drawn, self.clock, to.records,
         )?);
         self.interrupt.look_after_file_limit();
         Ok(())

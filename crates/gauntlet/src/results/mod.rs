@@ -10,6 +10,7 @@ pub mod gloves;
 pub mod headings;
 pub mod maps;
 pub mod paper;
+pub mod recordings;
 pub mod runs;
 pub mod settings;
 

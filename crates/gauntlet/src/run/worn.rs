@@ -12,6 +12,9 @@ impl Run {
     /// The glove's sensors do not sit straight: by `profile` they sit, if there is one.
     pub fn wears(&mut self, profile: Option<Bound>) {
         self.straight = false;
+        if let (Some(bound), Some(to)) = (&profile, &mut self.log_to) {
+            to.drawn.side = bound.profile.side;
+        }
         self.session.set_profile(profile);
     }
 

@@ -1,5 +1,6 @@
 //! The grippers that can stand at a line.
 
+use gripper::kinematics;
 use gripper::registers::two_finger;
 
 /// Which gripper.
@@ -47,6 +48,14 @@ impl Model {
         match self.two_finger() {
             None => gripper::space::AXES,
             Some(_) => 1,
+        }
+    }
+
+    /// Where its links are, for pictures.
+    pub fn kinematics(self) -> kinematics::Model {
+        match self.two_finger() {
+            None => kinematics::Model::ThreeFinger,
+            Some(model) => kinematics::Model::TwoFinger(model),
         }
     }
 

@@ -1,12 +1,16 @@
-//! The channels of a session log: topics, schemas, and how a record becomes messages.
+//! The decoded channels of a session log: topics, schemas, and how a record becomes messages.
 
-use glove::hand::{JOINT_NAMES, SEGMENT_NAMES};
-use serde_json::{Map, Value, json};
-use trainer::hand::Space;
+use std::collections::BTreeMap;
 
-use crate::session::record::{AXES, Command, Frame, Record, Sort};
+use glove::hand::Side;
+use serde_json::Value;
+
+use super::drawing::Drawn;
+use super::foxglove::{self, Entity, Level, Transform};
+use super::rates::Counting;
+use super::{cdr, fields, robot_description};
+use crate::session::record::{Frame, Record, Sort};
 use crate::session::snapshot::Status;
-use crate::words;
 
 /// Index into [`CHANNELS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,334 +21,279 @@ pub(super) enum Channel {
     Command,
     Status,
     Events,
+    Headings,
+    Rates,
+    Transforms,
+    FixedTransforms,
+    Scene,
+    RobotDescription,
+    Log,
+}
+
+/// How a channel is coded.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Coding {
+    /// JSON with a JSON schema, by the gripper's number of axes.
+    Json(fn(usize) -> Value),
+    /// Protocol Buffers, with the descriptors of the schema's name.
+    Protobuf,
+    /// A ROS 2 message.
+    Ros2(&'static str),
 }
 
 /// One channel.
+#[derive(Debug)]
 pub(super) struct Description {
     pub topic: &'static str,
     pub schema_name: &'static str,
-    /// By the gripper's number of axes.
-    pub schema: fn(usize) -> Value,
+    coding: Coding,
 }
+
+impl Description {
+    /// How its messages are coded.
+    pub(super) const fn message_encoding(&self) -> &'static str {
+        match self.coding {
+            Coding::Json(_) => "json",
+            Coding::Protobuf => "protobuf",
+            Coding::Ros2(_) => "cdr",
+        }
+    }
+
+    /// How its schema is written.
+    pub(super) const fn schema_encoding(&self) -> &'static str {
+        match self.coding {
+            Coding::Json(_) => "jsonschema",
+            Coding::Protobuf => "protobuf",
+            Coding::Ros2(_) => "ros2msg",
+        }
+    }
+
+    /// What it says of itself besides.
+    pub(super) fn metadata(&self, drawn: Drawn) -> BTreeMap<String, String> {
+        let hand = match drawn.side {
+            Side::Right => "right",
+            Side::Left => LEFT,
+        };
+        let said = (self.topic == JOINT_ANGLES).then(|| (HAND.to_owned(), hand.to_owned()));
+        said.into_iter().collect()
+    }
+
+    /// Its schema, for a gripper with so many axes.
+    pub(super) fn schema(&self, axes: usize) -> Vec<u8> {
+        match self.coding {
+            Coding::Json(schema) => schema(axes).to_string().into_bytes(),
+            Coding::Protobuf => foxglove::descriptors(self.schema_name),
+            Coding::Ros2(text) => text.as_bytes().to_vec(),
+        }
+    }
+}
+
+const fn json(
+    topic: &'static str,
+    schema_name: &'static str,
+    schema: fn(usize) -> Value,
+) -> Description {
+    Description {
+        topic,
+        schema_name,
+        coding: Coding::Json(schema),
+    }
+}
+
+const fn protobuf(topic: &'static str, schema_name: &'static str) -> Description {
+    Description {
+        topic,
+        schema_name,
+        coding: Coding::Protobuf,
+    }
+}
+
+/// The metadata of the channel of the joint angles that says which hand it is, `right` or `left`.
+pub(super) const HAND: &str = "hand";
+/// A left one.
+pub(super) const LEFT: &str = "left";
+/// The topic of the joint angles: what an export reads.
+pub(super) const JOINT_ANGLES: &str = "/glove/joint_angles";
+/// The topic of the commands.
+pub(super) const COMMAND: &str = "/gripper/command";
 
 /// In the order of [`Channel`].
-pub(super) const CHANNELS: [Description; 6] = [
+pub(super) const CHANNELS: [Description; 13] = [
+    json("/glove/imu", "gauntlet.ImuFrame", fields::imu_schema),
+    json(JOINT_ANGLES, "gauntlet.JointAngles", fields::angles_schema),
+    json("/map/output", "gauntlet.MapOutput", fields::output_schema),
+    json(COMMAND, "gauntlet.GripperCommand", fields::command_schema),
+    json(
+        "/gripper/status",
+        "gauntlet.GripperStatus",
+        fields::status_schema,
+    ),
+    json("/events", "gauntlet.Event", fields::event_schema),
+    json(
+        "/glove/headings",
+        "gauntlet.Headings",
+        fields::headings_schema,
+    ),
+    json("/bridge/rates", "gauntlet.Rates", fields::rates_schema),
+    protobuf("/tf", "foxglove.FrameTransforms"),
+    protobuf("/tf_static", "foxglove.FrameTransforms"),
+    protobuf("/scene", "foxglove.SceneUpdate"),
     Description {
-        topic: "/glove/imu",
-        schema_name: "gauntlet.ImuFrame",
-        schema: imu_schema,
+        topic: "/robot_description",
+        schema_name: cdr::STRING_NAME,
+        coding: Coding::Ros2(cdr::STRING_SCHEMA),
     },
-    Description {
-        topic: "/glove/joint_angles",
-        schema_name: "gauntlet.JointAngles",
-        schema: angles_schema,
-    },
-    Description {
-        topic: "/map/output",
-        schema_name: "gauntlet.MapOutput",
-        schema: output_schema,
-    },
-    Description {
-        topic: "/gripper/command",
-        schema_name: "gauntlet.GripperCommand",
-        schema: command_schema,
-    },
-    Description {
-        topic: "/gripper/status",
-        schema_name: "gauntlet.GripperStatus",
-        schema: status_schema,
-    },
-    Description {
-        topic: "/events",
-        schema_name: "gauntlet.Event",
-        schema: event_schema,
-    },
+    protobuf("/log", "foxglove.Log"),
 ];
 
-/// Robotiq's letters of the axes, in the order of the positions; a 2-Finger gripper's only one has finger A's place.
-const LETTERS: [char; AXES] = ['A', 'B', 'C', 'S'];
+/// Least time between two messages of transforms, µs: 20 a second.
+const TRANSFORMS_EVERY: u64 = 50_000;
+/// Least time between two messages of headings, µs.
+const HEADINGS_EVERY: u64 = 1_000_000;
 
-/// The axes' names of a gripper with so many.
-fn axis_names(axes: usize) -> &'static [&'static str] {
-    Space::of_axes(axes).map_or(&[], Space::axis_names)
+/// A message on its way into the log.
+type Out = (Channel, Vec<u8>);
+
+/// Makes messages of records.
+#[derive(Debug)]
+pub(super) struct Decoder {
+    drawn: Drawn,
+    begun: bool,
+    rates: Counting,
+    /// The newest frames of the hand, and of the gripper, that move; none where nothing is known.
+    hand: Vec<Transform>,
+    gripper: Vec<Transform>,
+    /// Something moved since they were written, and when they were, µs.
+    moved: bool,
+    transforms_at: Option<u64>,
+    headings_at: Option<u64>,
 }
 
-/// The messages of one record.
-pub(super) fn messages(record: &Record) -> Vec<(Channel, Value)> {
-    match record {
-        Record::Frame(frame) => frame_messages(frame),
-        Record::Command(command) => vec![(Channel::Command, command_message(command))],
-        Record::Status(status) => vec![(Channel::Status, status_message(status))],
-        Record::Event { at, sort, text, .. } => vec![(
-            Channel::Events,
-            json!({ "time_us": at.as_ticks(), "fault": *sort == Sort::Fault, "text": text }),
-        )],
-    }
+/// Whether so much time has gone by.
+fn due(last: Option<u64>, now: u64, every: u64) -> bool {
+    last.is_none_or(|last| now >= last.saturating_add(every))
 }
 
-fn frame_messages(frame: &Frame) -> Vec<(Channel, Value)> {
-    let sensors: Map<String, Value> = SEGMENT_NAMES
-        .iter()
-        .zip(&frame.imus)
-        .map(|(name, imu)| {
-            let [w, x, y, z] = imu.quaternion;
-            let sensor = json!({
-                "w": w, "x": x, "y": y, "z": z,
-                "time_us": imu.stamp.as_ticks(), "health": imu.health.to_string(),
-            });
-            ((*name).to_owned(), sensor)
-        })
-        .collect();
-    let time = frame.at.as_ticks();
-    let mut messages = vec![
-        (
-            Channel::Imu,
-            json!({ "time_us": time, "sequence": frame.sequence, "sensors": sensors }),
-        ),
-        (
-            Channel::JointAngles,
-            json!({
-                "time_us": time,
-                "sequence": frame.sequence,
-                "valid": frame.angles_valid,
-                "angles": named(&JOINT_NAMES, &frame.angles),
-            }),
-        ),
-    ];
-    if let Some(output) = &frame.map_output {
-        messages.push((
-            Channel::MapOutput,
-            json!({
-                "time_us": time,
-                "sequence": frame.sequence,
-                "counts": named(axis_names(output.len()), output),
-            }),
-        ));
-    }
-    messages
-}
-
-fn named(names: &[&str], values: &[f32]) -> Map<String, Value> {
-    names
-        .iter()
-        .zip(values)
-        .map(|(name, value)| ((*name).to_owned(), json!(value)))
-        .collect()
-}
-
-fn command_message(command: &Command) -> Value {
-    let mut fields = Map::new();
-    fields.insert("time_us".to_owned(), json!(command.at.as_ticks()));
-    fields.insert("age_us".to_owned(), json!(command.age_us));
-    for (axis, letter) in LETTERS
-        .iter()
-        .enumerate()
-        .take(command.motion.position.len())
-    {
-        for (field, values) in [
-            ("rPR", &command.motion.position),
-            ("rSP", &command.motion.speed),
-            ("rFR", &command.motion.force),
-        ] {
-            fields.insert(format!("{field}{letter}"), json!(values.get(axis)));
+impl Decoder {
+    /// For such a hand and gripper.
+    pub(super) fn new(drawn: Drawn) -> Self {
+        Self {
+            drawn,
+            begun: false,
+            rates: Counting::default(),
+            hand: Vec::new(),
+            gripper: Vec::new(),
+            moved: false,
+            transforms_at: None,
+            headings_at: None,
         }
     }
-    Value::Object(fields)
-}
 
-fn status_message(status: &Status) -> Value {
-    let mut fields = Map::new();
-    let more = status.more.as_ref();
-    fields.insert("time_us".to_owned(), json!(status.stamp.as_ticks()));
-    fields.insert(
-        "gIMC".to_owned(),
-        json!(words::activation_code(status.activation)),
-    );
-    let going_to = more.map(|more| u8::from(more.going_to));
-    fields.insert("gGTO".to_owned(), json!(going_to));
-    fields.insert("gFLT".to_owned(), json!(status.fault.code()));
-    for (axis, letter) in LETTERS.iter().enumerate().take(status.position.len()) {
-        let contact = status.contact(axis).map(words::contact_code);
-        fields.insert(format!("gDT{letter}"), json!(contact));
-        for (field, value) in [
-            ("gPR", status.echo.get(axis)),
-            ("gPO", status.position.get(axis)),
-            ("gCU", more.and_then(|more| more.current.get(axis))),
-        ] {
-            fields.insert(format!("{field}{letter}"), json!(value));
+    /// The messages of one record, which happened at `at_ns` since 1970.
+    pub(super) fn messages(&mut self, record: &Record, at_ns: u64) -> Vec<Out> {
+        let mut out = Vec::new();
+        if !self.begun {
+            self.begun = true;
+            self.begin(at_ns, &mut out);
         }
+        let time_us = record.at().as_ticks();
+        match record {
+            Record::Frame(frame) => self.frame(frame, &mut out),
+            Record::Command(command) => out.push(text(Channel::Command, &fields::command(command))),
+            Record::Status(status) => self.status(status, &mut out),
+            Record::Event {
+                sort, text: said, ..
+            } => {
+                let level = match sort {
+                    Sort::Note => Level::Info,
+                    Sort::Fault => Level::Error,
+                };
+                let event = fields::event(time_us, *sort, said);
+                out.push(text(Channel::Events, &event));
+                out.push((Channel::Log, foxglove::log(at_ns, level, said)));
+            }
+        }
+        if let Some(rates) = self.rates.take(record) {
+            out.push(text(Channel::Rates, &fields::rates(time_us, &rates)));
+        }
+        if self.moved && due(self.transforms_at, time_us, TRANSFORMS_EVERY) {
+            self.moved = false;
+            self.transforms_at = Some(time_us);
+            let all = [&self.hand[..], &self.gripper].concat();
+            out.push((Channel::Transforms, foxglove::frame_transforms(at_ns, &all)));
+        }
+        out
     }
-    Value::Object(fields)
-}
 
-fn object(description: &str, fields: impl IntoIterator<Item = (String, Value)>) -> Value {
-    json!({
-        "type": "object",
-        "description": description,
-        "properties": fields.into_iter().collect::<Map<String, Value>>(),
-    })
-}
-
-fn field(name: &str, kind: &str, description: &str) -> (String, Value) {
-    (
-        name.to_owned(),
-        json!({ "type": kind, "description": description }),
-    )
-}
-
-fn time_field() -> (String, Value) {
-    field("time_us", "integer", "µs since the run began")
-}
-
-fn sequence_field() -> (String, Value) {
-    field(
-        "sequence",
-        "integer",
-        "the scanner's number of the frame; wraps at 2^32",
-    )
-}
-
-fn numbers(names: &[&str], unit: &str) -> Value {
-    object(unit, names.iter().map(|name| field(name, "number", unit)))
-}
-
-fn imu_schema(_: usize) -> Value {
-    let sensor = object(
-        "one sensor",
-        [
-            field("w", "number", "orientation, unit quaternion"),
-            field("x", "number", "orientation, unit quaternion"),
-            field("y", "number", "orientation, unit quaternion"),
-            field("z", "number", "orientation, unit quaternion"),
-            field("time_us", "integer", "when the orientation was read"),
-            field(
-                "health",
-                "string",
-                "good, or why the orientation is an old one",
-            ),
-        ],
-    );
-    let sensors = SEGMENT_NAMES
-        .iter()
-        .map(|name| ((*name).to_owned(), sensor.clone()));
-    object(
-        "one scan of the glove",
-        [
-            time_field(),
-            sequence_field(),
-            ("sensors".to_owned(), object("by segment", sensors)),
-        ],
-    )
-}
-
-fn angles_schema(_: usize) -> Value {
-    object(
-        "the joint angles of one scan",
-        [
-            time_field(),
-            sequence_field(),
-            field(
-                "valid",
-                "boolean",
-                "whether every angle rests on good samples",
-            ),
-            ("angles".to_owned(), numbers(&JOINT_NAMES, "radians")),
-        ],
-    )
-}
-
-fn output_schema(axes: usize) -> Value {
-    object(
-        "what the map makes of one scan, before filter, limits and rate",
-        [
-            time_field(),
-            sequence_field(),
+    /// What never changes: shapes, and the frames that do not move.
+    fn begin(&self, at_ns: u64, out: &mut Vec<Out>) {
+        let parts = self.drawn.parts();
+        let fixed: Vec<Transform> = parts
+            .iter()
+            .filter(|part| part.fixed)
+            .map(|part| Transform {
+                parent: part.parent,
+                child: part.name,
+                pose: part.rest,
+            })
+            .collect();
+        let entities: Vec<Entity> = parts
+            .into_iter()
+            .map(|part| Entity {
+                frame: part.name,
+                colour: part.colour,
+                shapes: part.shapes,
+            })
+            .collect();
+        let description = cdr::string(&robot_description::urdf(self.drawn));
+        out.extend([
+            (Channel::RobotDescription, description),
             (
-                "counts".to_owned(),
-                numbers(axis_names(axes), "counts, 0 open to 255 closed"),
+                Channel::FixedTransforms,
+                foxglove::frame_transforms(at_ns, &fixed),
             ),
-        ],
-    )
+            (Channel::Scene, foxglove::scene_update(at_ns, &entities)),
+        ]);
+    }
+
+    fn frame(&mut self, frame: &Frame, out: &mut Vec<Out>) {
+        out.push(text(Channel::Imu, &fields::imu(frame)));
+        out.push(text(Channel::JointAngles, &fields::joint_angles(frame)));
+        if let Some(output) = &frame.map_output {
+            out.push(text(Channel::MapOutput, &fields::map_output(frame, output)));
+        }
+        let time_us = frame.at.as_ticks();
+        if let Some(headings) = &frame.headings
+            && due(self.headings_at, time_us, HEADINGS_EVERY)
+        {
+            self.headings_at = Some(time_us);
+            out.push(text(
+                Channel::Headings,
+                &fields::headings(time_us, headings),
+            ));
+        }
+        // A hand whose angles are not known stands as it was.
+        if frame.angles_valid && frame.angles.iter().all(|angle| angle.is_finite()) {
+            self.hand = self.moving(self.drawn.hand(&frame.angles));
+            self.moved = true;
+        }
+    }
+
+    fn status(&mut self, status: &Status, out: &mut Vec<Out>) {
+        out.push(text(Channel::Status, &fields::status(status)));
+        let counts: Vec<f32> = status.position.iter().copied().map(f32::from).collect();
+        self.gripper = self.moving(self.drawn.gripper(&counts));
+        self.moved = true;
+    }
+
+    /// Those that move.
+    fn moving(&self, all: Vec<Transform>) -> Vec<Transform> {
+        all.into_iter()
+            .filter(|transform| !super::drawing::is_fixed(transform.child))
+            .collect()
+    }
 }
 
-fn command_schema(axes: usize) -> Value {
-    let age = (
-        "age_us".to_owned(),
-        json!({
-            "type": ["integer", "null"],
-            "description": "age of the oldest sample it rests on when it left; null for a hold",
-        }),
-    );
-    let axes = LETTERS.iter().take(axes).flat_map(|letter| {
-        [
-            field(
-                &format!("rPR{letter}"),
-                "integer",
-                "position requested, counts",
-            ),
-            field(
-                &format!("rSP{letter}"),
-                "integer",
-                "speed, 0 slowest to 255",
-            ),
-            field(&format!("rFR{letter}"), "integer", "force, 0 least to 255"),
-        ]
-    });
-    object(
-        "one command to the gripper",
-        [time_field(), age].into_iter().chain(axes),
-    )
-}
-
-fn status_schema(axes: usize) -> Value {
-    let axes = LETTERS.iter().take(axes).flat_map(|letter| {
-        [
-            field(
-                &format!("gDT{letter}"),
-                "integer",
-                "0 moving, 1 contact while opening, 2 contact while closing, 3 at position",
-            ),
-            field(
-                &format!("gPR{letter}"),
-                "integer",
-                "echo of the position requested",
-            ),
-            field(
-                &format!("gPO{letter}"),
-                "integer",
-                "position measured, counts",
-            ),
-            field(
-                &format!("gCU{letter}"),
-                "integer",
-                "motor current, 10 mA a count",
-            ),
-        ]
-    });
-    object(
-        "one status of the gripper",
-        [
-            time_field(),
-            field(
-                "gIMC",
-                "integer",
-                "0 reset, 1 activating, 2 changing mode, 3 ready",
-            ),
-            field("gGTO", "integer", "1 while it goes to requested positions"),
-            field("gFLT", "integer", "fault code, 0 for none"),
-        ]
-        .into_iter()
-        .chain(axes),
-    )
-}
-
-fn event_schema(_: usize) -> Value {
-    object(
-        "something that happened",
-        [
-            time_field(),
-            field("fault", "boolean", "whether it is a fault"),
-            field("text", "string", "what happened"),
-        ],
-    )
+fn text(channel: Channel, value: &Value) -> Out {
+    (channel, value.to_string().into_bytes())
 }

@@ -12,7 +12,8 @@ use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{MAGIC, McapResult, WriteOptions, Writer};
 
-use super::channels::{self, CHANNELS, Channel};
+use super::channels::{CHANNELS, Channel, Decoder};
+use super::drawing::Drawn;
 use crate::clock::Clock;
 use crate::session::record::Record;
 use crate::words::disk;
@@ -77,6 +78,7 @@ pub(super) struct LogFile {
     file: File,
     ids: [u16; CHANNELS.len()],
     sequence: [u32; CHANNELS.len()],
+    decoder: Decoder,
     clock: Clock,
     /// What was written, and what of that is closed.
     written: Whole,
@@ -88,12 +90,12 @@ impl LogFile {
     /// Creates the file; never over one that is there. `fault` is told what ends it.
     pub(super) fn create(
         path: &Path,
-        axes: usize,
+        drawn: Drawn,
         clock: Clock,
         fault: Arc<OnceLock<String>>,
     ) -> anyhow::Result<Self> {
         let file = File::create_new(path)?;
-        let log = Self::start(file, axes, clock, fault);
+        let log = Self::start(file, drawn, clock, fault);
         if log.is_err() {
             // Nothing is in it: it would only be in the way of the next try.
             let _ = std::fs::remove_file(path);
@@ -103,7 +105,7 @@ impl LogFile {
 
     fn start(
         file: File,
-        axes: usize,
+        drawn: Drawn,
         clock: Clock,
         fault: Arc<OnceLock<String>>,
     ) -> anyhow::Result<Self> {
@@ -122,10 +124,12 @@ impl LogFile {
         for (channel, id) in CHANNELS.iter().zip(&mut ids) {
             let schema = writer.add_schema(
                 channel.schema_name,
-                "jsonschema",
-                (channel.schema)(axes).to_string().as_bytes(),
+                channel.schema_encoding(),
+                &channel.schema(drawn.gripper.axes()),
             )?;
-            *id = writer.add_channel(schema, channel.topic, "json", &Default::default())?;
+            let encoding = channel.message_encoding();
+            let metadata = channel.metadata(drawn);
+            *id = writer.add_channel(schema, channel.topic, encoding, &metadata)?;
         }
         writer.flush()?;
         let mut log = Self {
@@ -133,6 +137,7 @@ impl LogFile {
             file,
             ids,
             sequence: [0; CHANNELS.len()],
+            decoder: Decoder::new(drawn),
             clock,
             written: Whole::default(),
             whole: Whole::default(),
@@ -186,9 +191,9 @@ impl LogFile {
     }
 
     fn write(&mut self, record: &Record) -> McapResult<()> {
-        for (channel, message) in channels::messages(record) {
-            let text = serde_json::to_vec(&message).map_err(io::Error::from)?;
-            self.write_message(channel, record, &text)?;
+        let at = self.clock.wall_ns(record.at());
+        for (channel, message) in self.decoder.messages(record, at) {
+            self.write_message(channel, record, &message)?;
         }
         Ok(())
     }

@@ -1,7 +1,7 @@
 //! The session log: one MCAP file with every frame, command and status of a run, once each.
 //!
-//! Six channels, JSON with a JSON schema each: `/glove/imu`, `/glove/joint_angles`, `/map/output`, `/gripper/command`
-//! (field names rPRA, rSPA, …), `/gripper/status` (gPOA, …), `/events`. `docs/session-log.md` lists the fields. The file
+//! Decoded channels are JSON with named fields and a schema each (`/glove/joint_angles`, `/gripper/command`, …), and what others'
+//! viewers draw: transforms, a scene and events as Protocol Buffers, a robot description as CDR. `docs/session-log.md` lists them. The file
 //! is written by a thread of its own, which the bridge's thread feeds through a bounded queue, so that a slow disk never slows the loop; what does not fit
 //! is counted and said. Every half second a chunk is closed: whatever ends the program, the file can be read from its
 //! start until then. A disk that takes no more ends the log and nothing else; [`SessionLog::fault`] says so at once, and
@@ -9,9 +9,21 @@
 //!
 //! [`poses`] writes what a training reads: a hand's joint angles as CSV.
 
+mod cdr;
 mod channels;
+mod drawing;
+pub mod export;
+mod fields;
 mod file;
+mod foxglove;
+pub mod openxr;
 pub mod poses;
+mod protobuf;
+mod rates;
+pub mod reader;
+mod robot_description;
+
+pub use drawing::Drawn;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -99,11 +111,11 @@ impl SessionLog {
     ///
     /// # Errors
     /// A failure that names the path.
-    pub fn create(path: &Path, axes: usize, clock: Clock, records: Records) -> Result<Self> {
+    pub fn create(path: &Path, drawn: Drawn, clock: Clock, records: Records) -> Result<Self> {
         let what = || format!("the session log {} cannot be written", path.display());
         let fault = Arc::new(OnceLock::new());
         let mut file =
-            LogFile::create(path, axes, clock, Arc::clone(&fault)).or_fail(what, NEXT_STEP)?;
+            LogFile::create(path, drawn, clock, Arc::clone(&fault)).or_fail(what, NEXT_STEP)?;
         let closing = Arc::new(AtomicBool::new(false));
         let (lost, closed) = (records.lost(), Arc::clone(&closing));
         let writer = std::thread::Builder::new()

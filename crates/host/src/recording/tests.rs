@@ -4,6 +4,7 @@ use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use gripper::{Activation, Contact, Fault, Instant, Motion, Status};
 use serde_json::Value;
 
+use super::drawing::tests::DRAWN;
 use super::*;
 use crate::session::record::{Command, Feed, Frame, Imu, Record, queue};
 
@@ -25,6 +26,7 @@ fn frame(sequence: u32) -> Record {
         angles_valid: true,
         map_output: (sequence > 0).then_some([0.1, 254.7, 127.0, 64.0].into()),
         following: false,
+        headings: None,
     }))
 }
 
@@ -70,32 +72,63 @@ fn log(path: &Path, records: impl IntoIterator<Item = Record>) -> (SessionLog, F
     let (feed, waiting) = queue(QUEUE);
     records.into_iter().for_each(|record| feed.hand(record));
     (
-        SessionLog::create(path, 4, Clock::start(), waiting).unwrap(),
+        SessionLog::create(path, DRAWN, Clock::start(), waiting).unwrap(),
         feed,
     )
 }
 
 fn refused(path: &Path) -> anyhow::Error {
-    SessionLog::create(path, 4, Clock::start(), queue(QUEUE).1).unwrap_err()
+    SessionLog::create(path, DRAWN, Clock::start(), queue(QUEUE).1).unwrap_err()
 }
 
-/// Topic → messages, read back with the field's own reader.
+/// Every field is in the schema, with its type, and no field is an array or `null`: plots flatten by name.
+fn assert_described(value: &Value, schema: &Value, name: &str) {
+    let kind = schema["type"]
+        .as_str()
+        .unwrap_or_else(|| panic!("{name} is not described"));
+    match value {
+        Value::Object(fields) => {
+            assert_eq!(kind, "object", "{name}");
+            for (field, value) in fields {
+                let described = &schema["properties"][field];
+                assert_described(value, described, &format!("{name}.{field}"));
+            }
+        }
+        Value::Number(number) => {
+            assert!(
+                kind == "number" || number.is_u64() && kind == "integer",
+                "{name}"
+            );
+        }
+        Value::String(word) if kind == "number" => {
+            assert!(
+                ["NaN", "Infinity", "-Infinity"].contains(&word.as_str()),
+                "{name}: {word}"
+            );
+        }
+        Value::String(_) => assert_eq!(kind, "string", "{name}"),
+        Value::Bool(_) => assert_eq!(kind, "boolean", "{name}"),
+        Value::Null | Value::Array(_) => panic!("{name} is {value}"),
+    }
+}
+
+/// Topic → messages, read back with the field's own reader; `null` for one that is no JSON.
 fn read_back(path: &Path) -> BTreeMap<String, Vec<Value>> {
     let bytes = std::fs::read(path).unwrap();
     let mut found: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
         let message = message.unwrap();
         let schema = message.channel.schema.as_ref().unwrap();
+        let topic = message.channel.topic.clone();
+        if message.channel.message_encoding != "json" {
+            found.entry(topic).or_default().push(Value::Null);
+            continue;
+        }
         assert_eq!(schema.encoding, "jsonschema");
         let schema: Value = serde_json::from_slice(&schema.data).unwrap();
         let value: Value = serde_json::from_slice(&message.data).unwrap();
-        let described: Vec<&String> = schema["properties"].as_object().unwrap().keys().collect();
-        let present: Vec<&String> = value.as_object().unwrap().keys().collect();
-        assert_eq!(described, present, "{}", message.channel.topic);
-        found
-            .entry(message.channel.topic.clone())
-            .or_default()
-            .push(value);
+        assert_described(&value, &schema, &topic);
+        found.entry(topic).or_default().push(value);
     }
     found
 }
@@ -109,7 +142,7 @@ fn every_record_is_in_the_log_once_under_its_topic() {
     let (log, feed) = log(&path, early);
     late.into_iter().for_each(|record| feed.hand(record));
     let written = log.finish();
-    assert_eq!((written.messages, written.lost), (8, 0));
+    assert_eq!((written.messages, written.lost), (13, 0));
 
     let found = read_back(&path);
     let counts: Vec<(&str, usize)> = found.iter().map(|(k, v)| (k.as_str(), v.len())).collect();
@@ -121,7 +154,12 @@ fn every_record_is_in_the_log_once_under_its_topic() {
             ("/glove/joint_angles", 2),
             ("/gripper/command", 1),
             ("/gripper/status", 1),
+            ("/log", 1),
             ("/map/output", 1),
+            ("/robot_description", 1),
+            ("/scene", 1),
+            ("/tf", 1),
+            ("/tf_static", 1),
         ]
     );
     let command = &found["/gripper/command"][0];
@@ -201,4 +239,119 @@ fn while_a_log_is_written_all_but_its_last_second_can_be_read() {
         std::thread::sleep(Duration::from_millis(50));
     }
     drop(log);
+}
+
+/// A frame at `us` with these angles.
+fn moved(us: u64, change: impl FnOnce(&mut Frame)) -> Record {
+    let Record::Frame(mut frame) = frame(1) else {
+        unreachable!("a frame is one");
+    };
+    frame.at = at(us);
+    change(&mut frame);
+    Record::Frame(frame)
+}
+
+#[test]
+fn a_number_that_is_none_is_a_word_and_comes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut sigma = [0.25; SEGMENT_COUNT];
+    sigma[4] = f32::INFINITY;
+    let odd = moved(10, |frame| {
+        frame.angles[3] = f32::NAN;
+        frame.angles[7] = f32::NEG_INFINITY;
+        frame.headings = Some(crate::session::snapshot::Headings {
+            sigma,
+            drift: [0.0; SEGMENT_COUNT],
+            degraded: 0,
+            unknown: 0,
+            poses: 0,
+            pose: None,
+        });
+    });
+    let (log, _feed) = log(&path, [odd]);
+    log.finish();
+    let found = read_back(&path);
+    let angles = &found["/glove/joint_angles"][0]["angles"];
+    assert_eq!(angles["thumb_mcp_flex"], "NaN");
+    assert_eq!(angles["index_mcp_twist"], "-Infinity");
+    let sigma = &found["/glove/headings"][0]["sigma"];
+    assert_eq!(
+        (&sigma["index_proximal"], &sigma["hand"]),
+        (&"Infinity".into(), &0.25.into())
+    );
+    let minus = fields::read_number(&angles["index_mcp_twist"]);
+    assert_eq!(minus, Some(f32::NEG_INFINITY));
+    // A hand whose angles are not known is not drawn.
+    assert!(!found.contains_key("/tf"));
+}
+
+#[test]
+fn transforms_come_twenty_times_a_second_at_most_and_rates_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let records = (0..400_u64).map(|k| moved(10_000 * k, |_| {}));
+    let (log, _feed) = log(&path, records);
+    log.finish();
+    let found = read_back(&path);
+    assert_eq!(found["/glove/imu"].len(), 400);
+    assert_eq!(found["/tf"].len(), 80);
+    let rates = &found["/bridge/rates"];
+    assert_eq!(rates.len(), 3);
+    assert_eq!(rates[0]["frames_hz"], 100.0);
+    assert!(rates[0].get("latency_mean_ms").is_none());
+}
+
+#[test]
+fn what_an_export_reads_is_what_was_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let mut all = records();
+    all.push(moved(60, |frame| frame.angles_valid = false));
+    let (log, _feed) = log(&path, all);
+    log.finish();
+    assert!(export::is_log(&path));
+    let exported = export::read(&path).unwrap();
+    assert_eq!((exported.poses.len(), exported.unknown), (2, 1));
+    assert!(exported.finished && exported.damage.is_empty());
+    let Record::Frame(frame) = frame(0) else {
+        unreachable!("a frame is one");
+    };
+    assert_eq!(exported.poses[0].angles, frame.angles);
+    assert_eq!(exported.commands[0].position, [1, 2, 3, 4]);
+    let table = exported.commands_csv();
+    assert_eq!(
+        table.lines().nth(1).unwrap(),
+        "0.000030,31.000,1,2,3,4,255,255,255,255,64,64,64,64"
+    );
+    let (hand, worst) = exported.openxr_csv();
+    assert_eq!(hand.lines().next().unwrap().split(',').count(), 1 + 26 * 7);
+    assert_eq!(hand.lines().count(), 3);
+    // The angles of this test are beyond a hand's: abduction comes back within a quarter turn only.
+    assert!(worst.is_finite());
+}
+
+#[test]
+fn of_a_log_cut_anywhere_what_can_be_read_is_exported_and_the_rest_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (log, _feed) = log(&path, (0..300).map(frame));
+    log.finish();
+    let whole = std::fs::read(&path).unwrap();
+    let mut most = 0;
+    for cut in (0..whole.len()).step_by(whole.len() / 60) {
+        std::fs::write(&path, &whole[..cut]).unwrap();
+        match export::read(&path) {
+            Ok(exported) => {
+                assert!(exported.poses.len() >= most, "{cut}");
+                most = exported.poses.len();
+                assert!(!exported.finished && !exported.notes().is_empty(), "{cut}");
+            }
+            Err(error) => {
+                assert_eq!(most, 0, "{cut}");
+                assert!(error.to_string().contains("run.mcap"), "{error}");
+            }
+        }
+    }
+    assert!(most >= 128, "{most}");
 }

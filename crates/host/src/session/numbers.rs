@@ -238,6 +238,7 @@ mod tests {
             angles_valid: true,
             map_output: None,
             following,
+            headings: None,
         }))
     }
 

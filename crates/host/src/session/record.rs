@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
 use super::axes::Axes;
-use super::snapshot::{Motion, Status};
+use super::snapshot::{Headings, Motion, Status};
 
 /// Axes of the 3-Finger gripper: its fingers A, B, C and the scissor.
 pub const AXES: usize = 4;
@@ -46,6 +46,8 @@ pub struct Frame {
     pub map_output: Option<Axes<f32>>,
     /// Whether the gripper follows the hand, so that a command must rest on this frame.
     pub following: bool,
+    /// What is known of the headings; `None` without a profile.
+    pub headings: Option<Headings>,
 }
 
 /// One command that left for the gripper.

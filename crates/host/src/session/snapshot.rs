@@ -157,6 +157,20 @@ pub struct Headings {
     pub pose: Option<PoseReport>,
 }
 
+impl Headings {
+    /// Of a bridge in this process; `None` without a profile.
+    pub fn of<const X: usize>(now: &Telemetry<X>) -> Option<Self> {
+        now.profile.is_there.then_some(Self {
+            sigma: now.sigma,
+            drift: now.drift,
+            degraded: now.degraded,
+            unknown: now.unknown,
+            poses: now.poses,
+            pose: now.pose,
+        })
+    }
+}
+
 /// The glove's sensors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Sensors {
@@ -194,14 +208,7 @@ impl<const X: usize> From<&Telemetry<X>> for Snapshot {
             calibration: now.calibration,
             calibration_known: true,
             profile: Some(now.profile),
-            headings: now.profile.is_there.then_some(Headings {
-                sigma: now.sigma,
-                drift: now.drift,
-                degraded: now.degraded,
-                unknown: now.unknown,
-                poses: now.poses,
-                pose: now.pose,
-            }),
+            headings: Headings::of(now),
             ids: [None; SEGMENT_COUNT],
             glove_baud: None,
             frame_sequence: now.frame_sequence,

@@ -12,7 +12,7 @@ use super::hub::{Happened, Hub, Said};
 use super::orders::{Order, Queue};
 use super::record::{Command, Feed, Frame, Imu, Record, Sort};
 use super::slots::MemorySlot;
-use super::snapshot::Snapshot;
+use super::snapshot::{Headings, Snapshot};
 use super::stopped::{HOLD_WAIT, Standing, Stopped};
 use crate::lines::glove::GloveBus;
 use crate::lines::{Line, Pc};
@@ -310,6 +310,7 @@ fn frame_record<const X: usize>(telemetry: &Telemetry<X>) -> Option<Frame> {
         angles_valid: telemetry.angles_valid,
         map_output: telemetry.map_output.map(Into::into),
         following: telemetry.state.is_moving(),
+        headings: Headings::of(telemetry),
     })
 }
 

@@ -10,6 +10,7 @@ use trainer::hand::motion::{FRAMES, Generator, RATE_HZ};
 use trainer::measures::NEIGHBOURS;
 
 use crate::failure::told;
+use crate::recording::export;
 use crate::report::Reporter;
 
 /// Fewest rows worth training on: some must be held out, and the distances of Eq. 17 need ten neighbours.
@@ -34,7 +35,7 @@ pub enum Motion {
 }
 
 impl Motion {
-    /// The recording at `path`, or without one the generator's motion.
+    /// The recording at `path`, a file of poses or a session log, or without one the generator's motion.
     ///
     /// # Errors
     /// A failure that names file, column and row.
@@ -71,7 +72,17 @@ impl Motion {
         let Some(path) = path else {
             return Ok(Self::Generated { seed });
         };
-        let mut table = Table::open(path, Columns::Named(&JOINT_NAMES)).map_err(told)?;
+        let columns = Columns::Named(&JOINT_NAMES);
+        let mut table = if export::is_log(path) {
+            let log = export::read(path)?;
+            for line in log.notes() {
+                reporter.note(&format!("note: {}: {line}", path.display()));
+            }
+            // What is asked of a file of poses is asked of a log's.
+            Table::read(log.poses_csv().as_bytes(), path, columns).map_err(told)?
+        } else {
+            Table::open(path, columns).map_err(told)?
+        };
         let found = match table.poses(&JOINT_NAMES) {
             Ok(poses) => poses,
             // The reader asks for one row; say how many this work needs.

@@ -12,6 +12,7 @@ use crate::run::{LogTo, Run};
 use host::clock::Clock;
 use host::lines::port::BAUD;
 use host::probe;
+use host::recording::Drawn;
 use host::session::record::Feed;
 use host::session::{Devices, InProcess, Parts};
 use host::training::model;
@@ -36,7 +37,11 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     let length = image.len();
     let model = options.gripper_model;
     let log = options.log.clone();
-    let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
+    let drawn = Drawn {
+        side: Side::Right,
+        gripper: model.kinematics(),
+    };
+    let (log, feed) = log.map(|path| LogTo::new(path, drawn)).unzip();
     let parts = opened(stage, &devices, image, feed)?;
     let session = InProcess::start(parts, clock, interrupt)?;
     tell.say(format_args!(

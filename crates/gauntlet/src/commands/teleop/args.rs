@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use crate::options::{DrivingOptions, LineOptions, ReadingOptions, model_parser, run_time};
+use crate::options::{DrivingOptions, LineOptions, OnOff, ReadingOptions, model_parser, run_time};
 use host::lines::Model;
 
 /// Which hand wears the glove.

@@ -9,6 +9,7 @@ use anyhow::Result;
 use glove::hand::Side;
 
 use crate::commands::glove::speed;
+use crate::options::OnOff;
 use crate::outputs;
 use crate::progress::Person;
 use crate::results;
@@ -22,6 +23,7 @@ use host::interrupt::Interrupt;
 use host::lines::list;
 use host::next::{Command, NextStep};
 use host::probe;
+use host::recording::Drawn;
 use host::session::{Devices, InProcess, Parts, check_image};
 use host::training::model;
 use host::words;
@@ -68,7 +70,11 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     speed::found(&tell, &options.glove, glove.found);
     let clock = Clock::start();
     let log = options.log.clone();
-    let (log, feed) = log.map(|path| LogTo::new(path, model.axes())).unzip();
+    let drawn = Drawn {
+        side: side(options.hand),
+        gripper: model.kinematics(),
+    };
+    let (log, feed) = log.map(|path| LogTo::new(path, drawn)).unzip();
     let parts = Parts {
         glove: glove.line,
         reading: options.reading.given(),

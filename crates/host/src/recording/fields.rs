@@ -1,0 +1,374 @@
+//! The fields of a log's JSON channels, by name: their messages and their schemas.
+//!
+//! No bare arrays and no `null`: plots flatten objects by key. A number that is not finite, which JSON does not have, is the text "NaN",
+//! "Infinity" or "-Infinity"; what is not known, or does not apply, is left out.
+
+use glove::hand::{JOINT_NAMES, SEGMENT_NAMES};
+use serde_json::{Map, Value, json};
+use trainer::hand::Space;
+
+use super::rates::Rates;
+use crate::session::record::{AXES, Command, Frame, Sort};
+use crate::session::snapshot::{Headings, Status};
+use crate::words;
+
+/// Robotiq's letters of the axes, in the order of the positions; a 2-Finger gripper's only one has finger A's place.
+pub(super) const LETTERS: [char; AXES] = ['A', 'B', 'C', 'S'];
+
+/// The axes' names of a gripper with so many.
+fn axis_names(axes: usize) -> &'static [&'static str] {
+    Space::of_axes(axes).map_or(&[], Space::axis_names)
+}
+
+/// `/glove/imu`.
+pub(super) fn imu(frame: &Frame) -> Value {
+    let sensors: Map<String, Value> = SEGMENT_NAMES
+        .iter()
+        .zip(&frame.imus)
+        .map(|(name, imu)| {
+            let [w, x, y, z] = imu.quaternion.map(number);
+            let sensor = json!({
+                "w": w, "x": x, "y": y, "z": z,
+                "time_us": imu.stamp.as_ticks(), "health": imu.health.to_string(),
+            });
+            ((*name).to_owned(), sensor)
+        })
+        .collect();
+    json!({ "time_us": frame.at.as_ticks(), "sequence": frame.sequence, "sensors": sensors })
+}
+
+/// `/glove/joint_angles`.
+pub(super) fn joint_angles(frame: &Frame) -> Value {
+    json!({
+        "time_us": frame.at.as_ticks(),
+        "sequence": frame.sequence,
+        "valid": frame.angles_valid,
+        "angles": named(&JOINT_NAMES, &frame.angles),
+    })
+}
+
+/// `/map/output`.
+pub(super) fn map_output(frame: &Frame, output: &[f32]) -> Value {
+    json!({
+        "time_us": frame.at.as_ticks(),
+        "sequence": frame.sequence,
+        "counts": named(axis_names(output.len()), output),
+    })
+}
+
+/// `/glove/headings`.
+pub(super) fn headings(time_us: u64, headings: &Headings) -> Value {
+    json!({
+        "time_us": time_us,
+        "sigma": named(&SEGMENT_NAMES, &headings.sigma),
+        "drift": named(&SEGMENT_NAMES, &headings.drift),
+    })
+}
+
+/// `/bridge/rates`.
+pub(super) fn rates(time_us: u64, rates: &Rates) -> Value {
+    let mut fields = Map::new();
+    let known = [
+        ("frames_hz", Some(rates.frames_hz)),
+        ("commands_hz", Some(rates.commands_hz)),
+        ("statuses_hz", Some(rates.statuses_hz)),
+        ("latency_mean_ms", rates.latency_ms.map(|(mean, _)| mean)),
+        ("latency_max_ms", rates.latency_ms.map(|(_, max)| max)),
+    ];
+    fields.insert("time_us".to_owned(), json!(time_us));
+    for (name, value) in known {
+        fields.extend(value.map(|value| (name.to_owned(), json!(value))));
+    }
+    Value::Object(fields)
+}
+
+/// `/events`.
+pub(super) fn event(time_us: u64, sort: Sort, text: &str) -> Value {
+    let fault = sort == Sort::Fault;
+    let level = if fault { "error" } else { "info" };
+    json!({ "time_us": time_us, "level": level, "fault": fault, "text": text })
+}
+
+/// As JSON has it, or a word.
+fn number(value: f32) -> Value {
+    if value.is_nan() {
+        json!("NaN")
+    } else if value.is_infinite() {
+        json!(if value > 0.0 { "Infinity" } else { "-Infinity" })
+    } else {
+        json!(value)
+    }
+}
+
+/// What [`imu`] and the like wrote for a number.
+pub(super) fn read_number(written: &Value) -> Option<f32> {
+    match written {
+        Value::Number(number) => number.as_f64().map(|value| value as f32),
+        Value::String(word) => match word.as_str() {
+            "NaN" => Some(f32::NAN),
+            "Infinity" => Some(f32::INFINITY),
+            "-Infinity" => Some(f32::NEG_INFINITY),
+            _ => None,
+        },
+        _ => None,
+    }
+}
+
+fn named(names: &[&str], values: &[f32]) -> Map<String, Value> {
+    names
+        .iter()
+        .zip(values)
+        .map(|(name, value)| ((*name).to_owned(), number(*value)))
+        .collect()
+}
+
+/// `/gripper/command`.
+pub(super) fn command(command: &Command) -> Value {
+    let mut fields = Map::new();
+    fields.insert("time_us".to_owned(), json!(command.at.as_ticks()));
+    fields.extend(command.age_us.map(|age| ("age_us".to_owned(), json!(age))));
+    for (axis, letter) in LETTERS
+        .iter()
+        .enumerate()
+        .take(command.motion.position.len())
+    {
+        for (field, values) in [
+            ("rPR", &command.motion.position),
+            ("rSP", &command.motion.speed),
+            ("rFR", &command.motion.force),
+        ] {
+            fields.insert(format!("{field}{letter}"), json!(values.get(axis)));
+        }
+    }
+    Value::Object(fields)
+}
+
+/// `/gripper/status`.
+pub(super) fn status(status: &Status) -> Value {
+    let mut fields = Map::new();
+    let more = status.more.as_ref();
+    fields.insert("time_us".to_owned(), json!(status.stamp.as_ticks()));
+    fields.insert(
+        "gIMC".to_owned(),
+        json!(words::activation_code(status.activation)),
+    );
+    let going_to = more.map(|more| u8::from(more.going_to));
+    fields.extend(going_to.map(|going_to| ("gGTO".to_owned(), json!(going_to))));
+    fields.insert("gFLT".to_owned(), json!(status.fault.code()));
+    for (axis, letter) in LETTERS.iter().enumerate().take(status.position.len()) {
+        let contact = status.contact(axis).map(words::contact_code);
+        fields.extend(contact.map(|contact| (format!("gDT{letter}"), json!(contact))));
+        for (field, value) in [
+            ("gPR", status.echo.get(axis)),
+            ("gPO", status.position.get(axis)),
+            ("gCU", more.and_then(|more| more.current.get(axis))),
+        ] {
+            fields.extend(value.map(|value| (format!("{field}{letter}"), json!(value))));
+        }
+    }
+    Value::Object(fields)
+}
+
+fn object(description: &str, fields: impl IntoIterator<Item = (String, Value)>) -> Value {
+    json!({
+        "type": "object",
+        "description": description,
+        "properties": fields.into_iter().collect::<Map<String, Value>>(),
+    })
+}
+
+fn field(name: &str, kind: &str, description: &str) -> (String, Value) {
+    (
+        name.to_owned(),
+        json!({ "type": kind, "description": description }),
+    )
+}
+
+fn time_field() -> (String, Value) {
+    field("time_us", "integer", "µs since the run began")
+}
+
+fn sequence_field() -> (String, Value) {
+    field(
+        "sequence",
+        "integer",
+        "the scanner's number of the frame; wraps at 2^32",
+    )
+}
+
+fn numbers(names: &[&str], unit: &str) -> Value {
+    object(unit, names.iter().map(|name| field(name, "number", unit)))
+}
+
+pub(super) fn imu_schema(_: usize) -> Value {
+    let sensor = object(
+        "one sensor",
+        [
+            field("w", "number", "orientation, unit quaternion"),
+            field("x", "number", "orientation, unit quaternion"),
+            field("y", "number", "orientation, unit quaternion"),
+            field("z", "number", "orientation, unit quaternion"),
+            field("time_us", "integer", "when the orientation was read"),
+            field(
+                "health",
+                "string",
+                "good, or why the orientation is an old one",
+            ),
+        ],
+    );
+    let sensors = SEGMENT_NAMES
+        .iter()
+        .map(|name| ((*name).to_owned(), sensor.clone()));
+    object(
+        "one scan of the glove",
+        [
+            time_field(),
+            sequence_field(),
+            ("sensors".to_owned(), object("by segment", sensors)),
+        ],
+    )
+}
+
+pub(super) fn angles_schema(_: usize) -> Value {
+    object(
+        "the joint angles of one scan",
+        [
+            time_field(),
+            sequence_field(),
+            field(
+                "valid",
+                "boolean",
+                "whether every angle rests on good samples",
+            ),
+            ("angles".to_owned(), numbers(&JOINT_NAMES, "radians")),
+        ],
+    )
+}
+
+pub(super) fn output_schema(axes: usize) -> Value {
+    object(
+        "what the map makes of one scan, before filter, limits and rate",
+        [
+            time_field(),
+            sequence_field(),
+            (
+                "counts".to_owned(),
+                numbers(axis_names(axes), "counts, 0 open to 255 closed"),
+            ),
+        ],
+    )
+}
+
+pub(super) fn command_schema(axes: usize) -> Value {
+    let age = field(
+        "age_us",
+        "integer",
+        "age of the oldest sample it rests on when it left; left out for a hold",
+    );
+    let axes = LETTERS.iter().take(axes).flat_map(|letter| {
+        [
+            field(
+                &format!("rPR{letter}"),
+                "integer",
+                "position requested, counts",
+            ),
+            field(
+                &format!("rSP{letter}"),
+                "integer",
+                "speed, 0 slowest to 255",
+            ),
+            field(&format!("rFR{letter}"), "integer", "force, 0 least to 255"),
+        ]
+    });
+    object(
+        "one command to the gripper",
+        [time_field(), age].into_iter().chain(axes),
+    )
+}
+
+pub(super) fn status_schema(axes: usize) -> Value {
+    let axes = LETTERS.iter().take(axes).flat_map(|letter| {
+        [
+            field(
+                &format!("gDT{letter}"),
+                "integer",
+                "0 moving, 1 contact while opening, 2 contact while closing, 3 at position",
+            ),
+            field(
+                &format!("gPR{letter}"),
+                "integer",
+                "echo of the position requested",
+            ),
+            field(
+                &format!("gPO{letter}"),
+                "integer",
+                "position measured, counts",
+            ),
+            field(
+                &format!("gCU{letter}"),
+                "integer",
+                "motor current, 10 mA a count",
+            ),
+        ]
+    });
+    object(
+        "one status of the gripper",
+        [
+            time_field(),
+            field(
+                "gIMC",
+                "integer",
+                "0 reset, 1 activating, 2 changing mode, 3 ready",
+            ),
+            field("gGTO", "integer", "1 while it goes to requested positions"),
+            field("gFLT", "integer", "fault code, 0 for none"),
+        ]
+        .into_iter()
+        .chain(axes),
+    )
+}
+
+pub(super) fn event_schema(_: usize) -> Value {
+    object(
+        "something that happened",
+        [
+            time_field(),
+            field("level", "string", "info or error"),
+            field("fault", "boolean", "whether it is a fault"),
+            field("text", "string", "what happened"),
+        ],
+    )
+}
+
+pub(super) fn headings_schema(_: usize) -> Value {
+    let sigma = "how sure the joint's heading is: standard deviation, radians; Infinity where there is none";
+    object(
+        "the headings between a segment and the one it hangs on",
+        [
+            time_field(),
+            ("sigma".to_owned(), numbers(&SEGMENT_NAMES, sigma)),
+            (
+                "drift".to_owned(),
+                numbers(&SEGMENT_NAMES, "radians a second"),
+            ),
+        ],
+    )
+}
+
+pub(super) fn rates_schema(_: usize) -> Value {
+    object(
+        "what came in the last second",
+        [
+            time_field(),
+            field("frames_hz", "number", "frames of the glove a second"),
+            field("commands_hz", "number", "commands that left a second"),
+            field("statuses_hz", "number", "statuses that came back a second"),
+            field(
+                "latency_mean_ms",
+                "number",
+                "from a sample to the first command that rests on it; left out where none did",
+            ),
+            field("latency_max_ms", "number", "the longest of them"),
+        ],
+    )
+}
