@@ -537,7 +537,21 @@ fn lines() -> Vec<String> {
     text.extend(worn);
     text.extend(profile_refusals().map(|why| line(&reply(Err(Refusal::Profile(why))))));
     text.push(line(&FromBridge::Scan(scan())));
+    text.push(line(&reply(Ok(not_taken(NotTaken::HasProfile)))));
     text
+}
+
+fn not_taken(why: NotTaken) -> Answer {
+    Answer::Health(Health {
+        clutch: Position::Open,
+        calibration: CalibrationState {
+            is_calibrated: false,
+            newest: Try::Refused(why),
+            ended: 1,
+        },
+        restart: Restart::Power,
+        stalls: 0,
+    })
 }
 
 /// The calls for a glove with a profile.
@@ -583,14 +597,13 @@ fn worn_answers() -> Vec<Answer> {
     };
     let mut ids = [None; 16];
     ids[1] = Some(core::array::from_fn(|i| 16 * i as u8));
-    let not_taken = [
+    let refused = [
         NotTaken::NoProfile,
         NotTaken::OtherGlove,
         NotTaken::Tilted {
             segment: 14,
             by: 0.5,
         },
-        NotTaken::HasProfile,
     ];
     let mut all = vec![
         Answer::Profile(ProfilePart {
@@ -602,18 +615,7 @@ fn worn_answers() -> Vec<Answer> {
         Answer::Headings(headings(None)),
         Answer::Headings(headings(Some(pose))),
     ];
-    all.extend(not_taken.map(|why| {
-        Answer::Health(Health {
-            clutch: Position::Open,
-            calibration: CalibrationState {
-                is_calibrated: false,
-                newest: Try::Refused(why),
-                ended: 1,
-            },
-            restart: Restart::Power,
-            stalls: 0,
-        })
-    }));
+    all.extend(refused.map(not_taken));
     all
 }
 

@@ -206,6 +206,8 @@ pub struct BusScanner<B> {
     job: Option<machine::Job>,
     step: Option<machine::ActiveStep>,
     phase: machine::Phase,
+    /// When anything on the bus answered last.
+    answered: Instant,
     /// Stamp of the newest good sample of any sensor.
     seen: Instant,
     counters: Counters,
@@ -269,6 +271,7 @@ impl<B: Bus> BusScanner<B> {
             job: None,
             step: None,
             phase: machine::Phase::Starting,
+            answered: Instant::from_ticks(0),
             seen: Instant::from_ticks(0),
             counters: Counters::default(),
             config,

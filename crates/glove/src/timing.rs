@@ -116,7 +116,7 @@ pub const ALL_FROZEN_AFTER: Duration = Duration::from_ticks(200_000);
 /// Nobody looked at the sensors for this long: what they did meanwhile is not known.
 pub const UNSEEN: Duration = Duration::from_ticks(200_000);
 
-/// A sensor that did not answer for so long may have been exchanged for another one: nobody pulls out a plug and puts another
+/// A glove that did not answer for so long may have been exchanged for another one: nobody pulls out a plug and puts another
 /// one in faster.
 pub const EXCHANGE: Duration = Duration::from_ticks(500_000);
 

@@ -34,12 +34,13 @@ fn identify(a: u8, id: UniqueId) -> Vec<Expect> {
     script
 }
 
-fn unique_id(a: u8, id: UniqueId) -> [Expect; 4] {
+fn unique_id(a: u8, id: UniqueId) -> [Expect; 5] {
     [
         write(a, 0x07, 0x01), // page 1
         read(a, 0x50, &id),
         read(a, 0x50, &id),
         write(a, 0x07, 0x00),
+        read(a, 0x07, &[0x00]),
     ]
 }
 

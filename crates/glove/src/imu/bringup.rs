@@ -296,13 +296,15 @@ fn read(i2c: &mut Replay<'_>, address: u8, register: u8) -> Result<u8, Unanswere
     Ok(byte[0])
 }
 
-/// Reads the unique id twice from page 1, so that a flipped bit is not taken for another sensor.
+/// Reads the unique id twice from page 1, so that a flipped bit is not taken for another sensor; and whether it is back on page 0, as what
+/// is read there next would be other registers.
 fn unique_id(i2c: &mut Replay<'_>, address: u8) -> Result<Option<UniqueId>, Failure> {
     let (mut id, mut again): (UniqueId, UniqueId) = ([0; 16], [0; 16]);
     i2c.write(address, &[register::PAGE_ID, 1])?;
     i2c.write_read(address, &[register::UNIQUE_ID], &mut id)?;
     i2c.write_read(address, &[register::UNIQUE_ID], &mut again)?;
     i2c.write(address, &[register::PAGE_ID, 0])?;
+    check(register::PAGE_ID, 0, read(i2c, address, register::PAGE_ID)?)?;
     let [wrote, ..] = id;
     if let Some((_, read)) = id.iter().zip(again).find(|(a, b)| **a != *b) {
         return Err(Failure::Sensor(Error::ReadBack {

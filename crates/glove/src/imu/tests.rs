@@ -142,12 +142,13 @@ fn pause(step: Step, micros: u64) -> Outcome {
 const UNIQUE: UniqueId = [3, 1, 4, 1, 5, 9, 2, 6, 5, 3, 5, 8, 9, 7, 9, 3];
 
 /// It is read, twice.
-fn unique(a: u8) -> [Expect; 4] {
+fn unique(a: u8) -> [Expect; 5] {
     [
         Expect::write(a, vec![0x07, 0x01]),
         Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
         Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
         page(a),
+        read(a, 0x07, 0x00),
     ]
 }
 
@@ -164,6 +165,7 @@ fn a_unique_id_that_reads_otherwise_the_second_time_or_is_none_names_nobody() {
             Expect::write_read(a, vec![0x50], first.to_vec()),
             Expect::write_read(a, vec![0x50], second.to_vec()),
             page(a),
+            read(a, 0x07, 0x00),
         ]);
         let outcome = run(Step::Identify, a, &mut bus);
         bus.release().done();
@@ -189,6 +191,7 @@ fn bring_up_makes_exactly_these_transactions() {
         Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
         Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
         page(a),
+        read(a, 0x07, 0x00),
         // Stop: CONFIG, because a running sensor does not take a reset.
         page(a),
         read(a, 0x3D, 0x0C),
@@ -285,6 +288,7 @@ fn what_is_wrong_at_bring_up_is_named() {
         Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
         Expect::write_read(a, vec![0x50], UNIQUE.to_vec()),
         page(a),
+        read(a, 0x07, 0x00),
         Expect::write_read(a, vec![0x39], vec![1, 3]),
     ]);
     let absent = Error::Bus {

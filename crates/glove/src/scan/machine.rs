@@ -97,8 +97,9 @@ impl<B: Bus> BusScanner<B> {
     }
 
     fn take(&mut self, result: Result<Reply, Error>, now: Instant) -> Option<Frame> {
-        if result.is_err() {
-            self.mux.forget();
+        match result {
+            Ok(_) => self.answered = now,
+            Err(_) => self.mux.forget(),
         }
         let job = self.job.take()?;
         if result == Err(Error::Stalled) {

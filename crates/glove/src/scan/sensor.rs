@@ -50,8 +50,6 @@ pub(super) struct Sensor {
     pub is_identified: bool,
     /// It is asked who it is, after a time in which another may have been put in its place.
     pub is_doubtful: bool,
-    /// When it answered last, whatever it said.
-    answered: Instant,
     good: Option<(Quaternion, Instant)>,
     /// Nobody looked at any sensor for a while, and until then it was good: it was not away.
     unseen: bool,
@@ -87,7 +85,6 @@ impl Sensor {
             trouble: None,
             is_identified: false,
             is_doubtful: false,
-            answered: NEVER,
             good: None,
             unseen: false,
             asked: NEVER,
@@ -161,7 +158,6 @@ impl Sensor {
         counters.repaired = counters.repaired.wrapping_add(u32::from(mended));
         self.raw = Some(raw);
         self.pointer_set = true;
-        self.answered = stamp;
         match self.judge(&raw, stamp) {
             Ok(orientation) => {
                 let orientation = match self.good {
@@ -339,11 +335,6 @@ impl Sensor {
         } else {
             (self.step, self.due, self.tries) = (Some(Step::Recheck), now, 0);
         }
-    }
-
-    /// Whether it has been sampled and gave no answer for longer than `longest`.
-    pub fn is_silent(&self, now: Instant, longest: Duration) -> bool {
-        self.is_running() && since(now, self.answered) > longest
     }
 
     /// Another may be in its place: it is asked who it is before it is sampled again.

@@ -25,7 +25,7 @@ impl Sensor {
     ) -> bool {
         self.tries = 0;
         self.forget();
-        (self.is_doubtful, self.answered) = (false, now);
+        self.is_doubtful = false;
         if step.reads_id() && outcome.next != Some(Step::Identify) {
             self.is_identified = outcome.unique_id.is_some();
         }

@@ -126,6 +126,7 @@ impl Chip {
             self.pointer += count as u8;
         }
         match pointer {
+            0x07 => vec![0],
             0x00 => [0xA0, 0xFB, 0x32, 0x0F, 0x11, 0x03, 0x15, 0x00][..count].to_vec(),
             0x20 if self.mode == 0 || now < self.fusion_from => vec![0; 8],
             0x20 => {
