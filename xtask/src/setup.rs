@@ -11,8 +11,16 @@ use std::process::Command;
 
 /// QEMU for the chip.
 pub const EMULATOR: &str = "qemu-system-arm";
-/// Modbus programs of others, in the versions that the tests were written with.
-const PEERS: [&str; 3] = ["pymodbus==3.13.1", "minimalmodbus==2.1.1", "pyserial==3.5"];
+/// Modbus programs and readers of logs of others, in the versions that the tests were written with.
+const PEERS: [&str; 7] = [
+    "pymodbus==3.13.1",
+    "minimalmodbus==2.1.1",
+    "pyserial==3.5",
+    "mcap==1.6.0",
+    "mcap-protobuf-support==0.6.0",
+    "mcap-ros2-support==0.6.0",
+    "foxglove-schemas-protobuf==0.4.0",
+];
 const PEERS_PYTHON: &str = "GAUNTLET_PEERS_PYTHON";
 
 /// A thing that a chore needs.
@@ -48,7 +56,7 @@ impl Thing {
         match self {
             Self::Target => "the core library for thumbv7em-none-eabihf",
             Self::Emulator => "qemu-system-arm",
-            Self::PeersPython => "Python's Modbus packages (peers in the tests)",
+            Self::PeersPython => "Python's Modbus and MCAP packages (peers in the tests)",
             Self::PeersMbpoll => "mbpoll (a peer in the tests)",
             Self::Nightly => "a nightly compiler",
             Self::CargoFuzz => "cargo-fuzz",
@@ -111,7 +119,8 @@ fn peers_folder() -> PathBuf {
 fn peers_python() -> Option<PathBuf> {
     let named = std::env::var_os(PEERS_PYTHON).map(PathBuf::from);
     let own = [PathBuf::from("python3"), peers_folder().join("bin/python")];
-    let import = ["-c", "import pymodbus, minimalmodbus, serial"];
+    let modules = "pymodbus, minimalmodbus, serial, mcap, mcap_protobuf, mcap_ros2";
+    let import = ["-c", &format!("import {modules}")];
     named
         .into_iter()
         .chain(own)

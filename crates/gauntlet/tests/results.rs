@@ -14,7 +14,7 @@ use bridge::protocol::message::{
     WeightsKind,
 };
 use gauntlet::results::{
-    calibrations, devices, gloves, headings, maps, named, paper, runs, settings,
+    calibrations, devices, gloves, headings, maps, named, paper, recordings, runs, settings,
 };
 use gripper::{Activation, Fault};
 use host::calibration::guide::{Check, Finding as Found, Joint};
@@ -257,6 +257,18 @@ fn results_of_maps_keep_their_names() {
         replaced: false,
         int16: Some(&int16),
     };
+    let log = recordings::ExportedLog {
+        log: path("session.mcap"),
+        poses: Some(recordings::Table {
+            file: "session.poses.csv".into(),
+            rows: 700,
+        }),
+        commands: None,
+        openxr: None,
+        openxr_angle_error_deg: None,
+        finished: true,
+        notes: Vec::new(),
+    };
     let stored = maps::Stored {
         flashed: &flashed,
         int16: None,
@@ -268,6 +280,7 @@ fn results_of_maps_keep_their_names() {
             sample("train", paused),
             sample("eval", evaluated),
             sample("export", exported),
+            sample("export", log),
             sample("flash", stored),
         ],
     );

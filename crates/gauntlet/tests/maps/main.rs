@@ -7,6 +7,7 @@ mod support;
 mod domains;
 mod domains_refused;
 mod export;
+mod export_log;
 mod reproduce;
 mod training;
 mod wrong_files;

@@ -378,7 +378,7 @@ fn file(message: &str, fields: &[(&str, &str)]) -> Message {
     for (name, values) in fields.iter().filter_map(|(_, kind)| kind.split_once(':')) {
         let values = (0..)
             .zip(values.split(','))
-            .map(|(number, value)| Message::default().text(1, value).whole(2, number));
+            .map(|(number, value)| Message::default().text(1, value).whole_even_zero(2, number));
         body = body.message(4, Message::default().text(1, name).messages(2, values));
     }
     file.message(4, body).text(12, "proto3")

@@ -177,4 +177,6 @@ impl Drop for SessionLog {
 }
 
 #[cfg(test)]
+mod peer_tests;
+#[cfg(test)]
 mod tests;

@@ -32,11 +32,17 @@ impl Message {
     }
 
     /// An int32, int64, bool or enum, none of them negative.
-    pub(super) fn whole(mut self, field: u32, value: u64) -> Self {
-        if value != 0 {
-            self.tag(field, VARINT);
-            self.varint_bytes(value);
+    pub(super) fn whole(self, field: u32, value: u64) -> Self {
+        match value {
+            0 => self,
+            value => self.whole_even_zero(field, value),
         }
+    }
+
+    /// As [`Message::whole`], where a 0 that stands there is not a number that is missing (proto2).
+    pub(super) fn whole_even_zero(mut self, field: u32, value: u64) -> Self {
+        self.tag(field, VARINT);
+        self.varint_bytes(value);
         self
     }
 

@@ -8,7 +8,7 @@ use super::drawing::tests::DRAWN;
 use super::*;
 use crate::session::record::{Command, Feed, Frame, Imu, Record, queue};
 
-fn at(us: u64) -> Instant {
+pub(super) fn at(us: u64) -> Instant {
     Instant::from_ticks(us)
 }
 
@@ -68,7 +68,7 @@ fn records() -> Vec<Record> {
 }
 
 /// A log for a gripper of four axes, and the session's end of its queue.
-fn log(path: &Path, records: impl IntoIterator<Item = Record>) -> (SessionLog, Feed) {
+pub(super) fn log(path: &Path, records: impl IntoIterator<Item = Record>) -> (SessionLog, Feed) {
     let (feed, waiting) = queue(QUEUE);
     records.into_iter().for_each(|record| feed.hand(record));
     (
@@ -242,7 +242,7 @@ fn while_a_log_is_written_all_but_its_last_second_can_be_read() {
 }
 
 /// A frame at `us` with these angles.
-fn moved(us: u64, change: impl FnOnce(&mut Frame)) -> Record {
+pub(super) fn moved(us: u64, change: impl FnOnce(&mut Frame)) -> Record {
     let Record::Frame(mut frame) = frame(1) else {
         unreachable!("a frame is one");
     };
