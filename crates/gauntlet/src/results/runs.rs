@@ -11,6 +11,7 @@ use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::training::quality::Quality;
 
+use super::maps::Start;
 use crate::wearer::Fit;
 
 /// What is left of a run: `teleop`, `bridge engage`, `bridge monitor`, `bridge log`.
@@ -48,6 +49,8 @@ pub struct Demo<'a> {
     pub epochs: usize,
     /// Reference pairs.
     pub pairs: usize,
+    /// All starts of the training, in their order; one of them is the map.
+    pub starts: Vec<Start>,
     /// How good the map is.
     pub quality: &'a Quality,
     /// The virtual person in the glove; `null` with ideal sensors.

@@ -95,8 +95,8 @@ fn table_3_s_poses_are_named_and_a_file_of_pairs_is_taken() {
             poses,
             "--out",
             out,
-            "--schedule",
-            "fast",
+            "--starts",
+            "1",
             "--epochs",
             "5",
         ];
@@ -162,8 +162,8 @@ fn a_hand_s_own_training_file_is_not_held_out() {
         poses,
         "--out",
         out,
-        "--schedule",
-        "fast",
+        "--starts",
+        "1",
         "--epochs",
         "5",
         "--pairs",
@@ -198,8 +198,8 @@ fn a_joint_that_rests_is_warned_of_by_its_name() {
         poses,
         "--out",
         out,
-        "--schedule",
-        "fast",
+        "--starts",
+        "1",
     ];
     let more = ["--epochs", "5", "--pairs", "heuristic:2", "--json"];
     let said = json(&run(&[&words[..], &more].concat()));

@@ -52,6 +52,14 @@ pub enum Error {
         "the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed)"
     )]
     OtherSettings,
+    /// Of another number of starts.
+    #[error("the checkpoint is of a training with {}, this one has {expected}", starts(*found))]
+    OtherStarts {
+        /// In the file.
+        found: usize,
+        /// Of the training at hand.
+        expected: usize,
+    },
     /// Of other answers.
     #[error(
         "the checkpoint was made with other true pairs (--truth), which answer for its reference pairs"
@@ -68,12 +76,20 @@ impl Remedy for Error {
                 "use the samples it was made with, with the same seed and share held out".to_owned()
             }
             Self::OtherSettings => "use those it was made with".to_owned(),
+            Self::OtherStarts { found, .. } => format!("--starts {found}"),
             Self::OtherAnswers => "use those it was made with".to_owned(),
         }
     }
 }
 
-fn broken(why: impl Into<String>) -> Error {
+fn starts(count: usize) -> String {
+    match count {
+        1 => "one start".to_owned(),
+        more => format!("{more} starts"),
+    }
+}
+
+pub(super) fn broken(why: impl Into<String>) -> Error {
     Error::Broken { why: why.into() }
 }
 
@@ -82,7 +98,7 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
 }
 
 /// Over the words, in the order of their keys, and the arrays with their names and lengths.
-fn digest<'a>(
+pub(super) fn digest<'a>(
     words: impl Iterator<Item = (&'a str, &'a str)>,
     arrays: impl Iterator<Item = (&'a str, &'a [u8])>,
 ) -> String {
@@ -100,18 +116,33 @@ fn digest<'a>(
     hexadecimal(&hash.finalize())
 }
 
+pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    whole_file::write(path, bytes).map_err(|source| Error::File {
+        verb: "write",
+        file: path.to_owned(),
+        source,
+    })
+}
+
+pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(LONGEST).read_to_end(&mut bytes))
+        .map_err(|source| Error::File {
+            verb: "read",
+            file: path.to_owned(),
+            source,
+        })?;
+    Ok(bytes)
+}
+
 impl Trainer {
     /// Writes a checkpoint, whole or not at all.
     ///
     /// # Errors
     /// [`Error::File`].
     pub fn save_checkpoint(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
-        whole_file::write(path, &self.checkpoint()?).map_err(|source| Error::File {
-            verb: "write",
-            file: path.to_owned(),
-            source,
-        })
+        write_file(path.as_ref(), &self.checkpoint()?)
     }
 
     /// Goes on where a checkpoint of the same samples and settings stopped.
@@ -119,16 +150,7 @@ impl Trainer {
     /// # Errors
     /// Any of [`Error`]; then nothing has changed.
     pub fn load_checkpoint(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
-        let mut bytes = Vec::new();
-        std::fs::File::open(path)
-            .and_then(|file| file.take(LONGEST).read_to_end(&mut bytes))
-            .map_err(|source| Error::File {
-                verb: "read",
-                file: path.to_owned(),
-                source,
-            })?;
-        self.resume(&bytes)
+        self.resume(&read_file(path.as_ref())?)
     }
 
     /// The checkpoint's bytes.

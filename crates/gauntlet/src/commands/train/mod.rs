@@ -8,6 +8,7 @@ mod show;
 use anyhow::Result;
 
 pub(in crate::commands) use args::deviation;
+pub(in crate::commands) use show::taken;
 pub use args::{CoverageArgs, Schedule, Train};
 
 use crate::progress::Person;
@@ -56,6 +57,7 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
             epochs: learned.trained.epochs,
             pairs: learned.trained.pairs.inputs.rows,
             seed: options.seed,
+            starts: maps::Start::all(&learned.starts),
             training_s: learned.took.as_secs_f64(),
             warnings: &learned.warnings,
             quality: match is_hand {
@@ -66,7 +68,7 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
         };
         return results::print("train", trained);
     }
-    tell.say(format_args!("trained    in {}", seconds(learned.took)));
+    tell.say(format_args!("trained    in {}{}", seconds(learned.took), show::taken(&learned.starts)));
     let lines = if is_hand {
         vec![quality.line()]
     } else {

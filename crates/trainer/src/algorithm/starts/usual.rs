@@ -1,0 +1,53 @@
+//! What several starts do where nothing else is said, by measurement (docs/measurements/starts.md).
+
+use crate::algorithm::Plan;
+use crate::network::Initialisation;
+
+/// How many starts, and what differs in them from the paper's one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Usual {
+    /// Starts.
+    pub count: usize,
+    /// How the weights start.
+    pub initialisation: Initialisation,
+    /// [`Plan::stage_reconstruction`].
+    pub stage_reconstruction: f64,
+}
+
+impl Usual {
+    /// For planes.
+    pub const PLANE: Self = Self {
+        count: 48,
+        initialisation: Initialisation::Normal(0.03),
+        stage_reconstruction: 1.0,
+    };
+    /// For surfaces in space and more dimensions that no hand is in; they take longer.
+    pub const SURFACE: Self = Self {
+        count: 24,
+        ..Self::PLANE
+    };
+    /// For hands.
+    pub const HAND: Self = Self {
+        count: 8,
+        initialisation: Initialisation::Glorot,
+        stage_reconstruction: 1.0,
+    };
+
+    /// For a target of so many dimensions that is no hand's.
+    #[must_use]
+    pub const fn of_target(dimensions: usize) -> Self {
+        match dimensions {
+            0..=2 => Self::PLANE,
+            _ => Self::SURFACE,
+        }
+    }
+
+    /// The schedule's numbers with those of the starts.
+    #[must_use]
+    pub fn plan(&self, plan: Plan) -> Plan {
+        Plan {
+            stage_reconstruction: self.stage_reconstruction,
+            ..plan
+        }
+    }
+}
