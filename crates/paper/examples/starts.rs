@@ -12,9 +12,8 @@ mod domain;
 use core::ops::ControlFlow;
 use domain::{Domain, Result, domain};
 use std::time::Instant;
-use trainer::algorithm::{
-    Answers, InUnits, Plan, Schedule, Settings, Starts, Trainer, start_seed,
-};
+use trainer::algorithm::starts::Usual;
+use trainer::algorithm::{InUnits, Plan, Schedule, Settings, Starts, Trainer, start_seed};
 use trainer::cost::fast::evaluate;
 use trainer::data::Pairs;
 use trainer::measures::{NEIGHBOURS, fold_factor, measure, occupancy};
@@ -61,7 +60,16 @@ fn looks(plan: &Plan, pairs: usize) -> Vec<usize> {
     let total = early + plan.last_epochs;
     let part = |share: f64| risen + (share * (total - risen) as f64) as usize;
     let half_risen = early + plan.ramp_start + plan.ramp_epochs / 2;
-    vec![early, early + plan.ramp_start, half_risen, risen, part(0.25), part(0.5), part(0.75), total]
+    vec![
+        early,
+        early + plan.ramp_start,
+        half_risen,
+        risen,
+        part(0.25),
+        part(0.5),
+        part(0.75),
+        total,
+    ]
 }
 
 /// One start, with a line for each look.
@@ -82,7 +90,13 @@ fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
     trainer.train_with(&mut operator, each, &mut |trainer| {
         if looks.contains(&trainer.epoch()) {
             let networks = trainer.networks();
-            let (parts, _) = evaluate(&networks, (&domain.train, &domain.targets), &Pairs::default(), &full, 1);
+            let (parts, _) = evaluate(
+                &networks,
+                (&domain.train, &domain.targets),
+                &Pairs::default(),
+                &full,
+                1,
+            );
             let f = networks.f.cast::<f64>();
             let images: Vec<Vec<f64>> = train.iter().map(|q| f.eval(q)).collect();
             let epsilon = domain.coverage.epsilon(train.len()).unwrap_or(f64::NAN);
@@ -117,15 +131,24 @@ fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
 /// The machine itself: the map that is taken of so many starts, and what each start cost when it was judged last.
 fn best(domain: &mut Domain, settings: &Settings, count: usize, label: &str) -> Result<()> {
     let begin = Instant::now();
-    let mut starts =
-        Starts::new((&domain.train, &domain.targets), settings, count, Answers::ForEach)?;
+    let usual = match domain.truth {
+        Some(_) => Usual::of_target(domain.targets.cols),
+        None => Usual::HAND,
+    };
+    let mut starts = Starts::new(
+        (&domain.train, &domain.targets),
+        settings,
+        usual.several(count),
+    )?;
     let mut operator = InUnits {
         operator: domain.operator.as_mut(),
         input: &domain.units.0,
         target: &domain.units.1,
     };
     let go_on = &mut |_: &mut Starts| ControlFlow::Continue(());
-    let trained = starts.train_with(&mut operator, 10, go_on)?.ok_or("stopped")?;
+    let trained = starts
+        .train_with(&mut operator, 10, go_on)?
+        .ok_or("stopped")?;
     let m = measure(&trained.networks.f, &domain.test());
     let costs: Vec<String> = (starts.starts().iter())
         .map(|start| format!("{}:{:.5}", start.epochs, start.cost.unwrap_or(f64::NAN)))

@@ -5,9 +5,7 @@ use crate::shapes::{Domains, ShapePair, Singular};
 use core::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::time::Instant;
-use trainer::algorithm::{
-    self, Answers, InUnits, PairPlan, Schedule, Settings, Starts, Trained, Trainer,
-};
+use trainer::algorithm::{self, InUnits, PairPlan, Schedule, Settings, Starts, Trained, Trainer};
 use trainer::cost::Lambda;
 use trainer::data::{self, Matrix, Pairs};
 use trainer::hand::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
@@ -310,11 +308,16 @@ fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<
 }
 
 /// Several starts, of which the best is taken; on one thread, as all cells are.
-fn best_of_starts(cell: &Cell, prepared: &mut Prepared, watch: &dyn Watch) -> Result<Outcome, Error> {
+fn best_of_starts(
+    cell: &Cell,
+    prepared: &mut Prepared,
+    watch: &dyn Watch,
+) -> Result<Outcome, Error> {
     let begin = Instant::now();
     let fail = |source| failure(cell, source);
     let samples = (&prepared.train, &prepared.targets);
-    let mut starts = Starts::new(samples, &prepared.settings, cell.starts(), Answers::ForEach).map_err(fail)?;
+    let several = cell.usual().several(cell.starts());
+    let mut starts = Starts::new(samples, &prepared.settings, several).map_err(fail)?;
     let mut operator = InUnits {
         operator: prepared.operator.as_mut(),
         input: &prepared.units.0,
@@ -332,7 +335,13 @@ fn best_of_starts(cell: &Cell, prepared: &mut Prepared, watch: &dyn Watch) -> Re
         }
     });
     let trained = trained.map_err(fail)?.ok_or(Error::Stopped)?;
-    Ok(outcome(cell, prepared, &trained, Vec::new(), begin.elapsed().as_secs_f64()))
+    Ok(outcome(
+        cell,
+        prepared,
+        &trained,
+        Vec::new(),
+        begin.elapsed().as_secs_f64(),
+    ))
 }
 
 fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {

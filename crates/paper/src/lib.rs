@@ -167,11 +167,9 @@ impl Row {
             Self::CaePin => Cost::CaePin,
             Self::PinBa => Cost::PinBa,
             Self::DistortionPinBa => Cost::DistortionPinBa,
-            Self::HaeZero
-            | Self::HaeOne
-            | Self::HaeAdaptive
-            | Self::HaeFixed
-            | Self::HaeStarts => Cost::Hae,
+            Self::HaeZero | Self::HaeOne | Self::HaeAdaptive | Self::HaeFixed | Self::HaeStarts => {
+                Cost::Hae
+            }
         }
     }
 
@@ -272,10 +270,15 @@ impl Cell {
         let rises = self.epochs() - plan.last_epochs.saturating_sub(plan.ramp_start);
         let (mut from, mut live, mut work) = (0, self.starts(), 0.0);
         for cut in Cut::all(&plan, self.pairs, live) {
-            let spreading = if spreads { cut.epoch.saturating_sub(rises.max(from)) } else { 0 };
+            let spreading = if spreads {
+                cut.epoch.saturating_sub(rises.max(from))
+            } else {
+                0
+            };
             let before = cut.epoch - from - spreading;
             work += live as f64
-                * (before as f64 * self.epoch_work(false) + spreading as f64 * self.epoch_work(true));
+                * (before as f64 * self.epoch_work(false)
+                    + spreading as f64 * self.epoch_work(true));
             (from, live) = (cut.epoch, cut.keep);
         }
         work

@@ -53,7 +53,12 @@ pub fn text(table: &Table, frame: &Frame) -> String {
         Schedule::Paper => ", fast schedule",
         _ => "",
     };
-    let _ = writeln!(text, "{}: N = {}{schedule}, not in the paper", ours.row.title(), ours.starts());
+    let _ = writeln!(
+        text,
+        "{}: N = {}{schedule}, not in the paper",
+        ours.row.title(),
+        ours.starts()
+    );
     for order in table.orders() {
         let holds = if order.holds {
             "holds"

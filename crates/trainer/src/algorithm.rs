@@ -18,7 +18,7 @@ mod tests;
 pub use check::{Error, Warning};
 pub use drive::{InUnits, Nobody};
 pub use settings::{PairPlan, Plan, Schedule, Settings};
-pub use starts::{Answers, Starts, start_seed};
+pub use starts::{Answers, Several, Starts, start_seed};
 
 use crate::cost::engine::Engine;
 use crate::cost::reference::Autoencoder;

@@ -47,8 +47,8 @@ pub struct Request<'a> {
     pub start_pairs: bool,
     /// Of everything random.
     pub seed: u64,
-    /// As many starts as are likely to end within this time.
-    pub within: Duration,
+    /// As many starts as are likely to end within this time; `None`: one, whose map does not depend on the machine's speed.
+    pub within: Option<Duration>,
     /// Who hears of it.
     pub reporter: &'a dyn Reporter,
 }
@@ -56,7 +56,8 @@ pub struct Request<'a> {
 impl Request<'_> {
     fn course(&self) -> Course {
         Course {
-            within: Some(self.within),
+            within: self.within,
+            starts: self.within.is_none().then_some(1),
             ..Course::hae(self.schedule, self.epochs, self.seed)
         }
     }

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use trainer::algorithm::{Answers, InUnits, Starts};
+use trainer::algorithm::{InUnits, Starts};
 use trainer::remedy::Remedy;
 
 use super::task::{Course, Ended, Learned, Task};
@@ -139,7 +139,7 @@ fn starts_of((task, course): (&Task, &Course), count: usize) -> Result<Starts> {
         task.units.x.apply_all(&task.targets),
     );
     // Whoever answers is a script or a truth.
-    Starts::new((&q, &x), &course.settings(task), count, Answers::ForEach).map_err(told)
+    Starts::new((&q, &x), &course.settings(task), task.usual.several(count)).map_err(told)
 }
 
 /// Why a training ends before its end.

@@ -8,9 +8,9 @@
 
 mod checkpoint;
 mod cuts;
-mod usual;
 #[cfg(test)]
 mod tests;
+mod usual;
 
 pub use cuts::Cut;
 pub use usual::Usual;
@@ -47,6 +47,36 @@ pub enum Answers {
     /// A person, who shows each pose once: the first start asks, and the others take its pairs, each in an order of its own
     /// (the pair whose target is nearest to the one it would ask for).
     Once,
+}
+
+/// By what starts are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judge {
+    /// Eq. 13 without Pin.
+    Cost,
+    /// The same with α = 0, so that nothing is measured in the input domain but the reconstruction. For inputs of many more dimensions
+    /// than targets: what of them lies off any image of g makes up most of UCD(Q, g(X)), and says nothing of f.
+    CostInTarget,
+}
+
+/// How many starts, who answers them, and by what they are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Several {
+    /// Starts, at least one.
+    pub count: usize,
+    /// Who shows pairs.
+    pub answers: Answers,
+    /// By what they are judged.
+    pub judge: Judge,
+}
+
+impl Several {
+    /// One start: Algorithm 1 as it stands.
+    pub const ONE: Self = Self {
+        count: 1,
+        answers: Answers::ForEach,
+        judge: Judge::Cost,
+    };
 }
 
 /// What became of a start.
@@ -94,7 +124,7 @@ struct Runner {
 /// A training with several starts.
 pub struct Starts {
     settings: Settings,
-    answers: Answers,
+    several: Several,
     q: Matrix,
     x: Matrix,
     cuts: Vec<Cut>,
@@ -106,7 +136,7 @@ pub struct Starts {
 }
 
 impl Starts {
-    /// Gets ready to train `count` starts, at least one, on input samples `q` and target samples `x`, in network units.
+    /// Gets ready to train several starts on input samples `q` and target samples `x`, in network units.
     /// `settings.threads` are shared by the starts.
     ///
     /// # Errors
@@ -114,24 +144,28 @@ impl Starts {
     pub fn new(
         (q, x): (&Matrix, &Matrix),
         settings: &Settings,
-        count: usize,
-        answers: Answers,
+        several: Several,
     ) -> Result<Self, Error> {
+        let count = several.count.max(1);
         let plan = settings.schedule.plan_for(x.cols);
         let cuts = Cut::all(&plan, settings.pairs.count(), count);
         let settings = settings.clone();
-        let runners: Result<Vec<Runner>, Error> = (0..count.max(1))
+        let runners: Result<Vec<Runner>, Error> = (0..count)
             .map(|number| {
                 let seed = start_seed(settings.seed, number);
-                let of_start = Settings { seed, threads: 1, ..settings.clone() };
+                let of_start = Settings {
+                    seed,
+                    threads: 1,
+                    ..settings.clone()
+                };
                 let trainer = Trainer::new(q, x, &of_start)?;
                 Ok(Runner::new(seed, trainer))
             })
             .collect();
         let mut starts = Self {
-            pool: Pool::new(settings.threads.clamp(1, count.max(1))),
+            pool: Pool::new(settings.threads.clamp(1, count)),
             settings,
-            answers,
+            several,
             q: q.clone(),
             x: x.clone(),
             cuts,
@@ -187,7 +221,8 @@ impl Starts {
             .take(if alone { 1 } else { usize::MAX })
             .filter(|runner| runner.is_live && runner.trainer.epoch() < limit)
             .collect();
-        self.pool.for_each(&mut ready, |runner| runner.advance(epochs, limit));
+        self.pool
+            .for_each(&mut ready, |runner| runner.advance(epochs, limit));
         self.end_diverged()?;
         self.answer_from_shown();
         if let Some(target) = self.asked() {
@@ -196,7 +231,11 @@ impl Starts {
         if self.epoch() >= limit {
             self.cut();
         }
-        Ok(if self.made == self.cuts.len() { Advance::Done } else { Advance::Trained })
+        Ok(if self.made == self.cuts.len() {
+            Advance::Done
+        } else {
+            Advance::Trained
+        })
     }
 
     /// Takes the input for the target that [`Advance::NeedsPair`] named.
@@ -205,7 +244,9 @@ impl Starts {
     /// As [`Trainer::show`].
     pub fn show(&mut self, input: &[f32]) -> Result<(), Error> {
         let mut runners = self.runners.iter_mut();
-        let runner = runners.find(|runner| runner.asks.is_some()).ok_or(Error::Unasked)?;
+        let runner = runners
+            .find(|runner| runner.asks.is_some())
+            .ok_or(Error::Unasked)?;
         runner.trainer.show(input)?;
         runner.asks = None;
         Ok(())
@@ -216,7 +257,11 @@ impl Starts {
     pub fn standing(&self) -> Standing<'_> {
         let first = &self.runners[self.best()].trainer;
         let planned = cuts::epochs(&self.cuts, self.runners.len());
-        let epochs = self.runners.iter().map(|runner| runner.trainer.epoch()).sum();
+        let epochs = self
+            .runners
+            .iter()
+            .map(|runner| runner.trainer.epoch())
+            .sum();
         Standing {
             first: first.progress(),
             live: self.live().count(),
@@ -267,8 +312,7 @@ impl Starts {
 
     /// The same training before its first step.
     fn fresh(&self) -> Result<Self, Error> {
-        let count = self.runners.len();
-        Self::new((&self.q, &self.x), &self.settings, count, self.answers)
+        Self::new((&self.q, &self.x), &self.settings, self.several)
     }
 
     fn live(&self) -> impl Iterator<Item = &Runner> {
@@ -279,7 +323,8 @@ impl Starts {
     fn best(&self) -> usize {
         let cost = |number: usize| self.runners[number].cost.unwrap_or(0.0);
         let live = (0..self.runners.len()).filter(|number| self.runners[*number].is_live);
-        live.min_by(|a, b| cost(*a).total_cmp(&cost(*b))).unwrap_or(0)
+        live.min_by(|a, b| cost(*a).total_cmp(&cost(*b)))
+            .unwrap_or(0)
     }
 
     /// As many starts as are likely to end within this time on so many threads, judged by the speed of this training so far; at
@@ -290,7 +335,9 @@ impl Starts {
         let plan = self.settings.schedule.plan_for(self.x.cols);
         let seconds = |count: usize| {
             let cuts = Cut::all(&plan, self.settings.pairs.count(), count);
-            cuts::seconds((&cuts, count), (0, 0), (threads, 1), &|epochs| trainer.seconds(epochs))
+            cuts::seconds((&cuts, count), (0, 0), (threads, 1), &|epochs| {
+                trainer.seconds(epochs)
+            })
         };
         let fits = |count: &usize| seconds(*count) <= time.as_secs_f64();
         (1..=MOST).take_while(fits).last().unwrap_or(1)
@@ -315,13 +362,15 @@ impl Starts {
 
     /// A person shows all pairs to the first start before the others begin.
     fn is_first_alone(&self) -> bool {
-        self.answers == Answers::Once && !self.runners[0].trainer.has_all_pairs()
+        self.several.answers == Answers::Once && !self.runners[0].trainer.has_all_pairs()
     }
 
     /// What a person has shown answers for the further starts.
     fn answer_from_shown(&mut self) {
-        let Some((first, others)) = self.runners.split_first_mut() else { return };
-        if self.answers != Answers::Once {
+        let Some((first, others)) = self.runners.split_first_mut() else {
+            return;
+        };
+        if self.several.answers != Answers::Once {
             return;
         }
         for runner in others {
@@ -352,14 +401,24 @@ impl Starts {
 
     /// Judges the starts in the running, ends those that cost most, and shares the threads anew.
     fn cut(&mut self) {
-        let Some(cut) = self.cuts.get(self.made).copied() else { return };
-        let weights = judging(&self.settings, cut.attraction);
+        let Some(cut) = self.cuts.get(self.made).copied() else {
+            return;
+        };
+        let weights = judging((&self.settings, self.several.judge), cut.attraction);
         let (q, x) = (&self.q, &self.x);
-        let mut live: Vec<&mut Runner> =
-            self.runners.iter_mut().filter(|runner| runner.is_live).collect();
-        self.pool.for_each(&mut live, |runner| runner.judge((q, x), &weights));
+        let mut live: Vec<&mut Runner> = self
+            .runners
+            .iter_mut()
+            .filter(|runner| runner.is_live)
+            .collect();
+        self.pool
+            .for_each(&mut live, |runner| runner.judge((q, x), &weights));
         // Equal costs: the first ones.
-        live.sort_by(|a, b| a.cost.unwrap_or(f64::INFINITY).total_cmp(&b.cost.unwrap_or(f64::INFINITY)));
+        live.sort_by(|a, b| {
+            a.cost
+                .unwrap_or(f64::INFINITY)
+                .total_cmp(&b.cost.unwrap_or(f64::INFINITY))
+        });
         for runner in live.into_iter().skip(cut.keep.max(1)) {
             runner.is_live = false;
         }
@@ -426,10 +485,13 @@ impl Runner {
 }
 
 /// What starts are judged by: the cost without Pin, which every start brings to nothing; with Pin where there is nothing else.
-fn judging(settings: &Settings, attraction: bool) -> Weights {
+fn judging((settings, judge): (&Settings, Judge), attraction: bool) -> Weights {
     let mut full = settings.cost.weights(&settings.lambda);
     if !attraction {
         full.attraction = 0.0;
+    }
+    if judge == Judge::CostInTarget {
+        full.alpha = 0.0;
     }
     match full.reconstruction + full.distortion + full.attraction > 0.0 {
         true => Weights { pin: 0.0, ..full },
@@ -437,17 +499,24 @@ fn judging(settings: &Settings, attraction: bool) -> Weights {
     }
 }
 
-/// Of the pairs that were shown, the one that `used` has not and whose target is nearest to `wanted`.
+/// Of the pairs that were shown, the one that is not among `used` yet and whose target is nearest to `wanted`. A pair that was shown
+/// twice is there twice.
 fn nearest_unused(shown: &Pairs, used: &Pairs, wanted: &[f32]) -> Option<(Vec<f32>, Vec<f32>)> {
-    let is_used = |row: usize| {
-        let pairs = used.inputs.iter_rows().zip(used.targets.iter_rows());
-        pairs.into_iter().any(|(q, x)| q == shown.inputs.row(row) && x == shown.targets.row(row))
+    let row = |pairs: &Pairs, row: usize| {
+        [pairs.inputs.row(row), pairs.targets.row(row)].map(<[f32]>::to_vec)
     };
-    let distance = |row: usize| -> f32 {
-        let pairs = shown.targets.row(row).iter().zip(wanted);
+    let mut left: Vec<[Vec<f32>; 2]> = (0..shown.inputs.rows).map(|n| row(shown, n)).collect();
+    for pair in (0..used.inputs.rows).map(|n| row(used, n)) {
+        if let Some(place) = left.iter().position(|other| *other == pair) {
+            left.remove(place);
+        }
+    }
+    let distance = |target: &[f32]| -> f32 {
+        let pairs = target.iter().zip(wanted);
         pairs.map(|(a, b)| (a - b) * (a - b)).sum()
     };
-    let unused = (0..shown.inputs.rows).filter(|row| !is_used(*row));
-    let row = unused.min_by(|a, b| distance(*a).total_cmp(&distance(*b)))?;
-    Some((shown.inputs.row(row).to_vec(), shown.targets.row(row).to_vec()))
+    let nearest = left
+        .into_iter()
+        .min_by(|[_, a], [_, b]| distance(a).total_cmp(&distance(b)));
+    nearest.map(|[input, target]| (input, target))
 }

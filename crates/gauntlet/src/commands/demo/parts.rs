@@ -90,7 +90,7 @@ pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
         pairs: PAIRS,
         start_pairs: !options.no_start_pairs,
         seed: options.seed,
-        within: TRAINING,
+        within: Some(TRAINING),
         reporter: &Person,
     };
     tell.say(format_args!(
@@ -110,7 +110,11 @@ pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
         request.total_epochs()
     ));
     let outcome = train(&request, interrupt)?;
-    tell.say(format_args!("trained    in {}{}", seconds(outcome.took), taken(&outcome.starts)));
+    tell.say(format_args!(
+        "trained    in {}{}",
+        seconds(outcome.took),
+        taken(&outcome.starts)
+    ));
     tell.say(format_args!("quality    {}", outcome.quality.line()));
     require_good(&outcome.quality)?;
     Ok(outcome)

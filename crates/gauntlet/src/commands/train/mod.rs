@@ -8,8 +8,8 @@ mod show;
 use anyhow::Result;
 
 pub(in crate::commands) use args::deviation;
-pub(in crate::commands) use show::taken;
 pub use args::{CoverageArgs, Schedule, Train};
+pub(in crate::commands) use show::taken;
 
 use crate::progress::Person;
 use crate::results::{self, maps};
@@ -68,7 +68,11 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
         };
         return results::print("train", trained);
     }
-    tell.say(format_args!("trained    in {}{}", seconds(learned.took), show::taken(&learned.starts)));
+    tell.say(format_args!(
+        "trained    in {}{}",
+        seconds(learned.took),
+        show::taken(&learned.starts)
+    ));
     let lines = if is_hand {
         vec![quality.line()]
     } else {

@@ -1,6 +1,6 @@
 //! All starts of a training in one file: the checkpoints of those in the running, and what became of the others.
 
-use super::{Answers, Starts};
+use super::{Answers, Judge, Several, Starts};
 use crate::algorithm::checkpoint::{Error, broken, digest, read_file, write_file};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::collections::HashMap;
@@ -40,33 +40,47 @@ impl Starts {
         if let [only] = &self.runners[..] {
             return only.trainer.checkpoint();
         }
-        let live = self.runners.iter().enumerate().filter(|(_, runner)| runner.is_live);
-        let arrays: Result<Vec<(String, Vec<u8>)>, Error> =
-            live.map(|(number, runner)| Ok((name(number), runner.trainer.checkpoint()?))).collect();
+        let live = self
+            .runners
+            .iter()
+            .enumerate()
+            .filter(|(_, runner)| runner.is_live);
+        let arrays: Result<Vec<(String, Vec<u8>)>, Error> = live
+            .map(|(number, runner)| Ok((name(number), runner.trainer.checkpoint()?)))
+            .collect();
         let arrays = arrays?;
         // An ended start's cost, to the bit, and its epochs.
         let fates: Vec<String> = (self.runners.iter())
             .map(|runner| {
-                let cost = runner.cost.map_or("-".to_owned(), |cost| format!("{:016x}", cost.to_bits()));
+                let cost = runner
+                    .cost
+                    .map_or("-".to_owned(), |cost| format!("{:016x}", cost.to_bits()));
                 format!("{} {cost}", runner.trainer.epoch())
             })
             .collect();
         let words = [
             ("version", VERSION.to_owned()),
             ("starts", self.runners.len().to_string()),
-            ("answers", word(self.answers).to_owned()),
+            ("answers", words_of(&self.several)),
             ("cuts", format!("{:?}", self.cuts)),
             ("made", self.made.to_string()),
             ("fates", fates.join(", ")),
         ];
         let state = digest(
             words.iter().map(|(key, value)| (*key, value.as_str())),
-            arrays.iter().map(|(name, bytes)| (name.as_str(), &bytes[..])),
+            arrays
+                .iter()
+                .map(|(name, bytes)| (name.as_str(), &bytes[..])),
         );
         let words = words.into_iter().chain([(DIGEST, state)]);
         let words = words.map(|(key, value)| (key.to_owned(), value));
         let views: Result<Vec<_>, safetensors::SafeTensorError> = (arrays.iter())
-            .map(|(name, bytes)| Ok((name.as_str(), TensorView::new(Dtype::U8, vec![bytes.len()], bytes)?)))
+            .map(|(name, bytes)| {
+                Ok((
+                    name.as_str(),
+                    TensorView::new(Dtype::U8, vec![bytes.len()], bytes)?,
+                ))
+            })
             .collect();
         let views = views.map_err(|e| broken(e.to_string()))?;
         safetensors::serialize(views, Some(words.collect::<HashMap<_, _>>()))
@@ -82,7 +96,9 @@ impl Starts {
         let words = header.metadata().clone().unwrap_or_default();
         let found = match words.get("starts") {
             None => 1,
-            Some(count) => count.parse().map_err(|_| broken("'starts' is not a number"))?,
+            Some(count) => count
+                .parse()
+                .map_err(|_| broken("'starts' is not a number"))?,
         };
         let expected = self.runners.len();
         if found != expected {
@@ -109,11 +125,15 @@ impl Starts {
         if word_of(DIGEST)? != state {
             return Err(broken("it is not as it was written: its digest is another"));
         }
-        if word_of("answers")? != word(self.answers) || word_of("cuts")? != format!("{:?}", self.cuts) {
+        if word_of("answers")? != words_of(&self.several)
+            || word_of("cuts")? != format!("{:?}", self.cuts)
+        {
             return Err(Error::OtherSettings);
         }
         let fates: Vec<&str> = word_of("fates")?.split(", ").collect();
-        let made = word_of("made")?.parse().map_err(|_| broken("'made' is not a number"))?;
+        let made = word_of("made")?
+            .parse()
+            .map_err(|_| broken("'made' is not a number"))?;
         // All into a copy first, so that nothing has changed where one is refused.
         let mut fresh = self.fresh().map_err(|e| broken(e.to_string()))?;
         for (number, runner) in fresh.runners.iter_mut().enumerate() {
@@ -122,14 +142,17 @@ impl Starts {
             runner.cost = match cost {
                 "-" => None,
                 digits => Some(f64::from_bits(
-                    u64::from_str_radix(digits, 16).map_err(|_| broken("a cost is not a number"))?,
+                    u64::from_str_radix(digits, 16)
+                        .map_err(|_| broken("a cost is not a number"))?,
                 )),
             };
             match tensors.tensor(&name(number)) {
                 Ok(array) => runner.trainer.resume(array.data())?,
                 Err(_) => {
                     runner.is_live = false;
-                    let epochs = epochs.parse().map_err(|_| broken("an epoch is not a number"))?;
+                    let epochs = epochs
+                        .parse()
+                        .map_err(|_| broken("an epoch is not a number"))?;
                     runner.trainer.ended_after(epochs);
                 }
             }
@@ -145,9 +168,15 @@ impl Starts {
     }
 }
 
-fn word(answers: Answers) -> &'static str {
-    match answers {
+/// Who answers, and by what is judged.
+fn words_of(several: &Several) -> String {
+    let answers = match several.answers {
         Answers::ForEach => "for each",
         Answers::Once => "once",
-    }
+    };
+    let judge = match several.judge {
+        Judge::Cost => "cost",
+        Judge::CostInTarget => "cost in target",
+    };
+    format!("{answers}, {judge}")
 }

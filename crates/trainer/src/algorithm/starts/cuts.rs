@@ -64,7 +64,9 @@ fn stretches(cuts: &[Cut], count: usize) -> impl Iterator<Item = (Range<usize>, 
 
 /// Epochs of all starts together, from the first to the last.
 pub(super) fn epochs(cuts: &[Cut], count: usize) -> usize {
-    stretches(cuts, count).map(|(epochs, count)| count * epochs.len()).sum()
+    stretches(cuts, count)
+        .map(|(epochs, count)| count * epochs.len())
+        .sum()
 }
 
 /// A second thread of a start is worth so much of the first (docs/measurements/trainer.md: 5.2 s for 9.1).
@@ -99,17 +101,32 @@ mod tests {
             for schedule in [Schedule::Fast, Schedule::Paper] {
                 let plan = schedule.plan_for(2);
                 let cuts = Cut::all(&plan, 4, count);
-                assert!(cuts.windows(2).all(|w| w[0].epoch < w[1].epoch && w[0].keep >= w[1].keep));
+                assert!(
+                    cuts.windows(2)
+                        .all(|w| w[0].epoch < w[1].epoch && w[0].keep >= w[1].keep)
+                );
                 let total = 4 * plan.stage_epochs + plan.last_epochs;
-                assert_eq!(cuts.last(), Some(&Cut { epoch: total, keep: 1, attraction: true }));
+                assert_eq!(
+                    cuts.last(),
+                    Some(&Cut {
+                        epoch: total,
+                        keep: 1,
+                        attraction: true
+                    })
+                );
             }
         }
         assert_eq!(Cut::all(&Schedule::Fast.plan_for(2), 4, 1).len(), 1);
     }
 
     #[test]
-    fn two_starts_on_two_threads_take_the_first_stretch_at_once_and_help_each_other_in_the_second() {
-        let cut = |epoch| Cut { epoch, keep: 1, attraction: true };
+    fn two_starts_on_two_threads_take_the_first_stretch_at_once_and_help_each_other_in_the_second()
+    {
+        let cut = |epoch| Cut {
+            epoch,
+            keep: 1,
+            attraction: true,
+        };
         let cuts = [cut(100), cut(300)];
         let alone = |epochs: Range<usize>| epochs.len() as f64;
         let whole = |count, threads| seconds((&cuts, count), (0, 0), (threads, 1), &alone);

@@ -4,12 +4,23 @@ use crate::algorithm::{PairPlan, checkpoint};
 use crate::operator;
 
 fn settings(threads: usize) -> Settings {
-    Settings { threads, ..short(3) }
+    Settings {
+        threads,
+        ..short(3)
+    }
+}
+
+fn several(count: usize, answers: Answers) -> Several {
+    Several {
+        count,
+        answers,
+        judge: Judge::Cost,
+    }
 }
 
 fn starts(count: usize, threads: usize, answers: Answers) -> Starts {
     let (q, x) = samples();
-    Starts::new((&q, &x), &settings(threads), count, answers).unwrap()
+    Starts::new((&q, &x), &settings(threads), several(count, answers)).unwrap()
 }
 
 fn go_on(_: &mut Starts) -> ControlFlow<()> {
@@ -17,7 +28,10 @@ fn go_on(_: &mut Starts) -> ControlFlow<()> {
 }
 
 fn train(starts: &mut Starts, each: usize) -> Trained {
-    starts.train_with(&mut above(), each, &mut go_on).unwrap().unwrap()
+    starts
+        .train_with(&mut above(), each, &mut go_on)
+        .unwrap()
+        .unwrap()
 }
 
 #[test]
@@ -25,7 +39,10 @@ fn one_start_is_the_trainer_s_map_to_the_bit() {
     let (q, x) = samples();
     let mut trainer = Trainer::new(&q, &x, &settings(1)).unwrap();
     let go_on = &mut |_: &mut Trainer| ControlFlow::Continue(());
-    let want = trainer.train_with(&mut above(), 50, go_on).unwrap().unwrap();
+    let want = trainer
+        .train_with(&mut above(), 50, go_on)
+        .unwrap()
+        .unwrap();
     let mut one = starts(1, 1, Answers::ForEach);
     assert_eq!(flat(&train(&mut one, 50)), flat(&want));
     assert_eq!(one.starts()[0].seed, settings(1).seed);
@@ -38,7 +55,11 @@ fn threads_and_pauses_change_no_bit_of_what_several_starts_bring() {
     let want = flat(&train(&mut one, 50));
     for (threads, each) in [(2, 7), (3, 150), (16, 1)] {
         let mut other = starts(7, threads, Answers::ForEach);
-        assert_eq!(flat(&train(&mut other, each)), want, "{threads} threads, {each} epochs");
+        assert_eq!(
+            flat(&train(&mut other, each)),
+            want,
+            "{threads} threads, {each} epochs"
+        );
         assert_eq!(other.starts(), one.starts());
     }
 }
@@ -50,14 +71,23 @@ fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
     let total = seven.total();
     let fates = seven.starts();
     let taken: Vec<&Start> = fates.iter().filter(|start| start.is_live).collect();
-    let [taken] = taken[..] else { panic!("{fates:?}") };
+    let [taken] = taken[..] else {
+        panic!("{fates:?}")
+    };
     let rivals = fates.iter().filter(|start| start.epochs == total);
     assert!(rivals.clone().count() > 1);
-    assert!(rivals.clone().all(|rival| taken.cost.unwrap() <= rival.cost.unwrap()));
+    assert!(
+        rivals
+            .clone()
+            .all(|rival| taken.cost.unwrap() <= rival.cost.unwrap())
+    );
     assert!(fates.iter().any(|start| start.epochs < total));
     // Those that ended at the first cut had cost more than those that went on.
     let first = seven.cuts[0];
-    let dear = fates.iter().filter(|start| start.epochs == first.epoch).count();
+    let dear = fates
+        .iter()
+        .filter(|start| start.epochs == first.epoch)
+        .count();
     assert_eq!(dear, 7 - first.keep);
 }
 
@@ -67,18 +97,31 @@ fn the_cost_that_judges_is_equation_13_without_pin_over_all_samples() {
     let trained = train(&mut two, 50);
     let (q, x) = samples();
     let lists = |m: &Matrix| -> Vec<Vec<f64>> {
-        m.iter_rows().map(|row| row.iter().map(|v| f64::from(*v)).collect()).collect()
+        m.iter_rows()
+            .map(|row| row.iter().map(|v| f64::from(*v)).collect())
+            .collect()
     };
     let (q, x) = (lists(&q), lists(&x));
     let networks = crate::cost::reference::Autoencoder {
         f: trained.networks.f.cast::<f64>(),
         g: trained.networks.g.cast::<f64>(),
     };
-    let data = crate::cost::reference::Data { q: &q, x: &x, pair_q: &[], pair_x: &[] };
+    let data = crate::cost::reference::Data {
+        q: &q,
+        x: &x,
+        pair_q: &[],
+        pair_x: &[],
+    };
     let full = two.settings.cost.weights(&two.settings.lambda);
     let (parts, _) = crate::cost::reference::evaluate(&networks, &data, &full);
     let want = parts.total(&Weights { pin: 0.0, ..full });
-    let found = two.starts().into_iter().find(|start| start.is_live).unwrap().cost.unwrap();
+    let found = two
+        .starts()
+        .into_iter()
+        .find(|start| start.is_live)
+        .unwrap()
+        .cost
+        .unwrap();
     assert!((found / want - 1.0).abs() < 1e-4, "{found} {want}");
 }
 
@@ -109,9 +152,21 @@ fn starts_left_anywhere_go_on_bit_for_bit() {
 fn a_checkpoint_of_other_starts_or_a_broken_one_is_refused_and_changes_nothing() {
     let kept = starts(3, 1, Answers::ForEach).checkpoint().unwrap();
     let error = starts(2, 1, Answers::ForEach).resume(&kept).unwrap_err();
-    assert!(matches!(error, checkpoint::Error::OtherStarts { found: 3, expected: 2 }), "{error}");
+    assert!(
+        matches!(
+            error,
+            checkpoint::Error::OtherStarts {
+                found: 3,
+                expected: 2
+            }
+        ),
+        "{error}"
+    );
     let error = starts(1, 1, Answers::ForEach).resume(&kept).unwrap_err();
-    assert_eq!(error.to_string(), "the checkpoint is of a training with 3 starts, this one has 1");
+    assert_eq!(
+        error.to_string(),
+        "the checkpoint is of a training with 3 starts, this one has 1"
+    );
     let error = starts(3, 1, Answers::Once).resume(&kept).unwrap_err();
     assert!(matches!(error, checkpoint::Error::OtherSettings), "{error}");
     let mut same = starts(3, 1, Answers::ForEach);
@@ -142,7 +197,10 @@ fn a_person_shows_each_pair_once_and_every_start_has_them_in_an_order_of_its_own
     let run = |threads, each| {
         let mut all = starts(6, threads, Answers::Once);
         let mut person = Person(0);
-        let trained = all.train_with(&mut person, each, &mut go_on).unwrap().unwrap();
+        let trained = all
+            .train_with(&mut person, each, &mut go_on)
+            .unwrap()
+            .unwrap();
         assert_eq!(person.0, 3);
         (all, flat(&trained))
     };
@@ -156,27 +214,43 @@ fn a_person_shows_each_pair_once_and_every_start_has_them_in_an_order_of_its_own
         rows
     };
     let shown = all.runners[0].trainer.pairs();
-    assert!(all.runners.iter().all(|runner| sorted(runner.trainer.pairs()) == sorted(shown)));
-    assert!(all.runners.iter().any(|runner| runner.trainer.pairs() != shown));
+    assert!(
+        all.runners
+            .iter()
+            .all(|runner| sorted(runner.trainer.pairs()) == sorted(shown))
+    );
+    assert!(
+        all.runners
+            .iter()
+            .any(|runner| runner.trainer.pairs() != shown)
+    );
     assert!(all.runners.iter().all(|runner| runner.trainer.epoch() > 30));
 }
 
 #[test]
 fn a_person_s_pairs_are_kept_in_a_checkpoint_of_the_restarts() {
     let mut whole = starts(4, 1, Answers::Once);
-    let want = whole.train_with(&mut Person(0), 50, &mut go_on).unwrap().unwrap();
+    let want = whole
+        .train_with(&mut Person(0), 50, &mut go_on)
+        .unwrap()
+        .unwrap();
     let mut first = starts(4, 1, Answers::Once);
-    let stopped = first.train_with(&mut Person(0), 1, &mut |starts| {
-        match starts.starts()[1].epochs >= 15 {
+    let stopped = first.train_with(
+        &mut Person(0),
+        1,
+        &mut |starts| match starts.starts()[1].epochs >= 15 {
             true => ControlFlow::Break(()),
             false => ControlFlow::Continue(()),
-        }
-    });
+        },
+    );
     assert!(stopped.unwrap().is_none());
     let mut second = starts(4, 1, Answers::Once);
     second.resume(&first.checkpoint().unwrap()).unwrap();
     let mut person = Person(0);
-    let trained = second.train_with(&mut person, 50, &mut go_on).unwrap().unwrap();
+    let trained = second
+        .train_with(&mut person, 50, &mut go_on)
+        .unwrap()
+        .unwrap();
     assert_eq!((person.0, flat(&trained)), (0, flat(&want)));
 }
 
@@ -192,7 +266,11 @@ fn the_standing_counts_the_epochs_of_all_starts_and_ends_at_its_total() {
             ControlFlow::Continue(())
         })
         .unwrap();
-    assert!(seen.windows(2).all(|w| w[0].0 <= w[1].0 && w[0].2 >= w[1].2), "{seen:?}");
+    assert!(
+        seen.windows(2)
+            .all(|w| w[0].0 <= w[1].0 && w[0].2 >= w[1].2),
+        "{seen:?}"
+    );
     assert_eq!(seen.last(), Some(&(total, total, 1)));
     assert!(seven.standing().remaining.is_zero());
 }
@@ -201,7 +279,7 @@ fn the_standing_counts_the_epochs_of_all_starts_and_ends_at_its_total() {
 fn a_training_of_which_every_start_diverges_says_so() {
     let (mut q, x) = samples();
     q.data.iter_mut().for_each(|v| *v *= 1e30);
-    let mut all = Starts::new((&q, &x), &settings(2), 3, Answers::ForEach).unwrap();
+    let mut all = Starts::new((&q, &x), &settings(2), several(3, Answers::ForEach)).unwrap();
     let error = all.train_with(&mut above(), 10, &mut go_on).unwrap_err();
     assert!(matches!(error, Error::Diverged { .. }), "{error}");
 }
@@ -212,7 +290,10 @@ fn a_start_that_diverges_is_ended_and_the_others_go_on() {
     three.runners[1].diverged = Some(Error::Diverged { epoch: 0 });
     train(&mut three, 10);
     let fates = three.starts();
-    assert_eq!((fates[1].is_live, fates[1].cost), (false, Some(f64::INFINITY)));
+    assert_eq!(
+        (fates[1].is_live, fates[1].cost),
+        (false, Some(f64::INFINITY))
+    );
     assert!(fates.iter().any(|start| start.is_live));
 }
 
@@ -223,8 +304,14 @@ fn fixed_pairs_are_those_of_every_start() {
         inputs: Matrix::from_rows(&[[0.9, 0.7, 0.243]]),
         targets: Matrix::from_rows(&[[0.9, 0.7]]),
     };
-    let settings = Settings { pairs: PairPlan::Fixed(pairs.clone()), ..settings(2) };
-    let mut all = Starts::new((&q, &x), &settings, 3, Answers::Once).unwrap();
-    let trained = all.train_with(&mut crate::algorithm::Nobody, 50, &mut go_on).unwrap().unwrap();
+    let settings = Settings {
+        pairs: PairPlan::Fixed(pairs.clone()),
+        ..settings(2)
+    };
+    let mut all = Starts::new((&q, &x), &settings, several(3, Answers::Once)).unwrap();
+    let trained = all
+        .train_with(&mut crate::algorithm::Nobody, 50, &mut go_on)
+        .unwrap()
+        .unwrap();
     assert_eq!(trained.pairs.targets, pairs.targets);
 }

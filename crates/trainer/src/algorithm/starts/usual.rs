@@ -1,5 +1,6 @@
 //! What several starts do where nothing else is said, by measurement (docs/measurements/starts.md).
 
+use super::{Answers, Judge, Several};
 use crate::algorithm::Plan;
 use crate::network::Initialisation;
 
@@ -12,6 +13,8 @@ pub struct Usual {
     pub initialisation: Initialisation,
     /// [`Plan::stage_reconstruction`].
     pub stage_reconstruction: f64,
+    /// By what they are judged.
+    pub judge: Judge,
 }
 
 impl Usual {
@@ -20,6 +23,7 @@ impl Usual {
         count: 48,
         initialisation: Initialisation::Normal(0.03),
         stage_reconstruction: 1.0,
+        judge: Judge::Cost,
     };
     /// For surfaces in space and more dimensions that no hand is in; they take longer.
     pub const SURFACE: Self = Self {
@@ -31,7 +35,18 @@ impl Usual {
         count: 8,
         initialisation: Initialisation::Glorot,
         stage_reconstruction: 1.0,
+        judge: Judge::CostInTarget,
     };
+
+    /// So many starts, each answered for itself.
+    #[must_use]
+    pub const fn several(&self, count: usize) -> Several {
+        Several {
+            count,
+            answers: Answers::ForEach,
+            judge: self.judge,
+        }
+    }
 
     /// For a target of so many dimensions that is no hand's.
     #[must_use]
