@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Version of this file's meaning.
 const VERSION: &str = "4";
-/// No checkpoint is longer; what has no end is none.
+/// No checkpoint of a start is longer; what has no end is none.
 const LONGEST: u64 = 256 << 20;
 /// The key of the digest over everything else.
 const DIGEST: &str = "state_sha256";
@@ -124,10 +124,12 @@ pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     })
 }
 
-pub(super) fn read_file(path: &Path) -> Result<Vec<u8>, Error> {
+/// The bytes of a checkpoint of so many starts.
+pub(super) fn read_file(path: &Path, starts: usize) -> Result<Vec<u8>, Error> {
+    let longest = LONGEST.saturating_mul(starts as u64);
     let mut bytes = Vec::new();
     std::fs::File::open(path)
-        .and_then(|file| file.take(LONGEST).read_to_end(&mut bytes))
+        .and_then(|file| file.take(longest).read_to_end(&mut bytes))
         .map_err(|source| Error::File {
             verb: "read",
             file: path.to_owned(),
@@ -150,7 +152,7 @@ impl Trainer {
     /// # Errors
     /// Any of [`Error`]; then nothing has changed.
     pub fn load_checkpoint(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
-        self.resume(&read_file(path.as_ref())?)
+        self.resume(&read_file(path.as_ref(), 1)?)
     }
 
     /// The checkpoint's bytes.

@@ -13,19 +13,17 @@ mod tests;
 mod usual;
 
 pub use cuts::Cut;
+pub use several::{Answers, Judge, MOST, Several, Standing, Start};
 pub use usual::Usual;
 
-use super::{Advance, Error, Progress, Settings, Trained, Trainer, Warning};
-use crate::cost::{Weights, fast};
-use crate::data::{Matrix, Pairs};
+use super::{Advance, Error, Settings, Trained, Trainer, Warning};
+use crate::data::Matrix;
 use crate::operator::Operator;
 use crate::pool::Pool;
 use crate::random::Random;
 use core::ops::ControlFlow;
 use core::time::Duration;
-
-/// Most starts of a training.
-pub const MOST: usize = 64;
+use runner::{Runner, judging, nearest_unused};
 
 /// Random numbers of the seeds of further starts.
 const SEED_STREAM: u64 = 0x5354_4152;
@@ -37,88 +35,6 @@ pub fn start_seed(seed: u64, number: usize) -> u64 {
         0 => seed,
         _ => Random::new(seed, SEED_STREAM + number as u64).bits(),
     }
-}
-
-/// Who answers when a start asks for a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answers {
-    /// Whoever answers does so at no cost, a script or a truth: each start asks for pairs of its own.
-    ForEach,
-    /// A person, who shows each pose once: the first start asks, and the others take its pairs, each in an order of its own
-    /// (the pair whose target is nearest to the one it would ask for).
-    Once,
-}
-
-/// By what starts are judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Judge {
-    /// Eq. 13 without Pin.
-    Cost,
-    /// The same with α = 0, so that nothing is measured in the input domain but the reconstruction. For inputs of many more dimensions
-    /// than targets: what of them lies off any image of g makes up most of UCD(Q, g(X)), and says nothing of f.
-    CostInTarget,
-}
-
-/// How many starts, who answers them, and by what they are judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Several {
-    /// Starts, at least one.
-    pub count: usize,
-    /// Who shows pairs.
-    pub answers: Answers,
-    /// By what they are judged.
-    pub judge: Judge,
-}
-
-impl Several {
-    /// One start: Algorithm 1 as it stands.
-    pub const ONE: Self = Self {
-        count: 1,
-        answers: Answers::ForEach,
-        judge: Judge::Cost,
-    };
-}
-
-/// What became of a start.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start {
-    /// Its seed.
-    pub seed: u64,
-    /// Epochs done.
-    pub epochs: usize,
-    /// What it cost when it was judged last; infinite where its weights were no longer finite, `None` before the first time.
-    pub cost: Option<f64>,
-    /// Whether it is still in the running; at the end the one that is taken.
-    pub is_live: bool,
-}
-
-/// Where all starts stand.
-#[derive(Clone, Debug)]
-pub struct Standing<'a> {
-    /// The first start that is still in the running.
-    pub first: Progress<'a>,
-    /// Starts in the running.
-    pub live: usize,
-    /// All starts.
-    pub starts: usize,
-    /// Epochs done by all starts together.
-    pub epochs: usize,
-    /// Of how many.
-    pub total: usize,
-    /// How long the rest will take at the speed so far.
-    pub remaining: Duration,
-}
-
-/// One of the starts.
-struct Runner {
-    seed: u64,
-    trainer: Trainer,
-    /// Not once it was ended.
-    is_live: bool,
-    cost: Option<f64>,
-    /// The target whose input it waits for.
-    asks: Option<Vec<f32>>,
-    diverged: Option<Error>,
 }
 
 /// A training with several starts.
@@ -453,70 +369,4 @@ impl Starts {
         }
         said
     }
-}
-
-impl Runner {
-    fn new(seed: u64, trainer: Trainer) -> Self {
-        Self {
-            seed,
-            trainer,
-            is_live: true,
-            cost: None,
-            asks: None,
-            diverged: None,
-        }
-    }
-
-    fn advance(&mut self, epochs: usize, limit: usize) {
-        let left = limit.saturating_sub(self.trainer.epoch());
-        match self.trainer.advance(epochs.min(left)) {
-            Ok(Advance::NeedsPair(target)) => self.asks = Some(target),
-            Ok(Advance::Trained | Advance::Done) => {}
-            Err(error) => self.diverged = Some(error),
-        }
-    }
-
-    fn judge(&mut self, (q, x): (&Matrix, &Matrix), weights: &Weights) {
-        let networks = self.trainer.networks();
-        let (parts, _) = fast::evaluate(&networks, (q, x), self.trainer.pairs(), weights, 1);
-        let cost = parts.total(weights);
-        self.cost = Some(if cost.is_nan() { f64::INFINITY } else { cost });
-    }
-}
-
-/// What starts are judged by: the cost without Pin, which every start brings to nothing; with Pin where there is nothing else.
-fn judging((settings, judge): (&Settings, Judge), attraction: bool) -> Weights {
-    let mut full = settings.cost.weights(&settings.lambda);
-    if !attraction {
-        full.attraction = 0.0;
-    }
-    if judge == Judge::CostInTarget {
-        full.alpha = 0.0;
-    }
-    match full.reconstruction + full.distortion + full.attraction > 0.0 {
-        true => Weights { pin: 0.0, ..full },
-        false => full,
-    }
-}
-
-/// Of the pairs that were shown, the one that is not among `used` yet and whose target is nearest to `wanted`. A pair that was shown
-/// twice is there twice.
-fn nearest_unused(shown: &Pairs, used: &Pairs, wanted: &[f32]) -> Option<(Vec<f32>, Vec<f32>)> {
-    let row = |pairs: &Pairs, row: usize| {
-        [pairs.inputs.row(row), pairs.targets.row(row)].map(<[f32]>::to_vec)
-    };
-    let mut left: Vec<[Vec<f32>; 2]> = (0..shown.inputs.rows).map(|n| row(shown, n)).collect();
-    for pair in (0..used.inputs.rows).map(|n| row(used, n)) {
-        if let Some(place) = left.iter().position(|other| *other == pair) {
-            left.remove(place);
-        }
-    }
-    let distance = |target: &[f32]| -> f32 {
-        let pairs = target.iter().zip(wanted);
-        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
-    };
-    let nearest = left
-        .into_iter()
-        .min_by(|[_, a], [_, b]| distance(a).total_cmp(&distance(b)));
-    nearest.map(|[input, target]| (input, target))
 }

@@ -29,7 +29,7 @@ impl Starts {
     /// # Errors
     /// Any of [`Error`]; then nothing has changed.
     pub fn load_checkpoint(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
-        self.resume(&read_file(path.as_ref())?)
+        self.resume(&read_file(path.as_ref(), self.runners.len())?)
     }
 
     /// The checkpoint's bytes.

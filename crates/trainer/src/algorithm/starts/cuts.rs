@@ -29,10 +29,10 @@ impl Cut {
         let risen = (last + plan.ramp_start + plan.ramp_epochs).min(total);
         let half = risen + (total - risen) / 2;
         let cuts = [
-            (before, count.div_ceil(3)),
-            (rising, count.div_ceil(4)),
-            (risen, count.div_ceil(8)),
-            (half, count.div_ceil(16)),
+            (before, (2 * count).div_ceil(3)),
+            (rising, count.div_ceil(2)),
+            (risen, count.div_ceil(6)),
+            (half, count.div_ceil(12)),
             (total, 1),
         ];
         let mut live = count.max(1);

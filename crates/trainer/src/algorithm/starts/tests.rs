@@ -1,6 +1,8 @@
 use super::*;
 use crate::algorithm::tests::{above, flat, samples, short};
 use crate::algorithm::{PairPlan, checkpoint};
+use crate::cost::Weights;
+use crate::data::Pairs;
 use crate::operator;
 
 fn settings(threads: usize) -> Settings {

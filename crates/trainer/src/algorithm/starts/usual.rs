@@ -20,19 +20,19 @@ pub struct Usual {
 impl Usual {
     /// For planes.
     pub const PLANE: Self = Self {
-        count: 48,
+        count: 32,
         initialisation: Initialisation::Normal(0.03),
         stage_reconstruction: 1.0,
         judge: Judge::Cost,
     };
     /// For surfaces in space and more dimensions that no hand is in; they take longer.
     pub const SURFACE: Self = Self {
-        count: 24,
+        count: 16,
         ..Self::PLANE
     };
     /// For hands.
     pub const HAND: Self = Self {
-        count: 8,
+        count: 6,
         initialisation: Initialisation::Glorot,
         stage_reconstruction: 1.0,
         judge: Judge::CostInTarget,
