@@ -125,8 +125,7 @@ fn starts(task: &Task, course: &Course) -> Result<Starts> {
         Some(time) if wanted > 1 => {
             let mut trial = starts_of((task, course), 1)?;
             let _ = trial.advance(TRIAL).map_err(told)?;
-            let fit = trial.count_within(time, course.settings(task).threads);
-            wanted.min(fit)
+            wanted.min(trial.count_within(time))
         }
         _ => wanted,
     };

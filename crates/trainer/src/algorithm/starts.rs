@@ -243,15 +243,15 @@ impl Starts {
             .unwrap_or(0)
     }
 
-    /// As many starts as are likely to end within this time on so many threads, judged by the speed of this training so far; at
-    /// least one.
+    /// As many starts as are likely to end within this time, judged by the speed of this training so far; at least one.
     #[must_use]
-    pub fn count_within(&self, time: Duration, threads: usize) -> usize {
+    pub fn count_within(&self, time: Duration) -> usize {
+        let (threads, now) = self.threads();
         let trainer = &self.runners[self.best()].trainer;
         let plan = self.settings.schedule.plan_for(self.x.cols);
         let seconds = |count: usize| {
             let cuts = Cut::all(&plan, self.settings.pairs.count(), count);
-            cuts::seconds((&cuts, count), (0, 0), (threads, 1), &|epochs| {
+            cuts::seconds((&cuts, count), (0, 0), (threads, now), &|epochs| {
                 trainer.seconds(epochs)
             })
         };
@@ -259,10 +259,14 @@ impl Starts {
         (1..=MOST).take_while(fits).last().unwrap_or(1)
     }
 
-    fn remaining(&self, first: &Trainer) -> Duration {
+    /// All threads, and those of one start.
+    fn threads(&self) -> (usize, usize) {
         let threads = self.settings.threads.max(1);
-        let live = self.live().count();
-        let now = (threads / live.max(1)).max(1);
+        (threads, (threads / self.live().count().max(1)).max(1))
+    }
+
+    fn remaining(&self, first: &Trainer) -> Duration {
+        let (threads, now) = self.threads();
         let seconds = cuts::seconds(
             (&self.cuts, self.runners.len()),
             (self.made, self.epoch()),
@@ -350,8 +354,7 @@ impl Starts {
 
     /// Threads that have no start of their own help another.
     fn share_threads(&mut self) {
-        let live = self.live().count().max(1);
-        let each = (self.settings.threads / live).max(1);
+        let (_, each) = self.threads();
         for runner in self.runners.iter_mut().filter(|runner| runner.is_live) {
             runner.trainer.set_threads(each);
         }

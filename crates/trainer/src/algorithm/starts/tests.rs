@@ -300,6 +300,14 @@ fn a_start_that_diverges_is_ended_and_the_others_go_on() {
 }
 
 #[test]
+fn as_many_starts_fit_as_the_time_allows_and_one_in_any_case() {
+    let mut one = starts(1, 1, Answers::ForEach);
+    one.advance(9).unwrap();
+    assert_eq!(one.count_within(Duration::ZERO), 1);
+    assert_eq!(one.count_within(Duration::from_secs(1_000_000)), MOST);
+}
+
+#[test]
 fn fixed_pairs_are_those_of_every_start() {
     let (q, x) = samples();
     let pairs = Pairs {
