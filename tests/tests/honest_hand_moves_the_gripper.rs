@@ -154,6 +154,7 @@ fn trained() -> Vec<u8> {
             pairs: 8,
             start_pairs: true,
             seed: SEED,
+            within: None,
             reporter: &host::report::Nobody,
         },
         &Interrupt::never().expect("an interrupt"),

@@ -105,6 +105,7 @@ fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
             pairs: 8,
             start_pairs: true,
             seed: SEED,
+            within: None,
             reporter: &host::report::Nobody,
         },
         &Interrupt::never().unwrap(),

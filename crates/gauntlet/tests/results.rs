@@ -86,6 +86,19 @@ fn measured() -> Measured {
     }
 }
 
+fn starts() -> [trainer::algorithm::starts::Start; 2] {
+    let start = |seed, epochs, cost, is_live| trainer::algorithm::starts::Start {
+        seed,
+        epochs,
+        cost: Some(cost),
+        is_live,
+    };
+    [
+        start(1, 1_000, 0.25, true),
+        start(12_345_678_901_234_567_890, 400, f64::INFINITY, false),
+    ]
+}
+
 fn int16() -> Int16 {
     Int16 {
         error_counts: vec![0.25],
@@ -211,6 +224,7 @@ fn results_of_runs_keep_their_names() {
         training_s: 3.0,
         epochs: 1_000,
         pairs: 10,
+        starts: maps::Start::all(&starts()),
         quality: &quality,
         person: Some(&person),
         flash: Some(&flashed),
@@ -233,6 +247,7 @@ fn results_of_maps_keep_their_names() {
         epochs: 1_000,
         pairs: 10,
         seed: 1,
+        starts: maps::Start::all(&starts()),
         training_s: 3.0,
         warnings: &warnings,
         quality: maps::Measures::Hand(&quality),

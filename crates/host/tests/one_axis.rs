@@ -21,6 +21,7 @@ fn the_open_hand_opens_it_the_fist_closes_it_and_the_map_is_good_for_any_seed() 
             pairs: 8,
             start_pairs: true,
             seed,
+            within: None,
             reporter: &Nobody,
         };
         let outcome = train(&request, &Interrupt::never().unwrap()).unwrap();

@@ -5,7 +5,7 @@ use crate::shapes::{Domains, ShapePair, Singular};
 use core::ops::ControlFlow;
 use std::sync::OnceLock;
 use std::time::Instant;
-use trainer::algorithm::{self, InUnits, PairPlan, Settings, Trainer};
+use trainer::algorithm::{self, InUnits, PairPlan, Schedule, Settings, Starts, Trained, Trainer};
 use trainer::cost::Lambda;
 use trainer::data::{self, Matrix, Pairs};
 use trainer::hand::motion::{FRAMES, Generator, RATE_HZ, joints::COUNT};
@@ -117,7 +117,7 @@ impl Laboratory {
         };
         let held_out = part(&domains.truth, &split.test);
         let plan = match cell.row {
-            Row::HaeAdaptive => PairPlan::Adaptive {
+            Row::HaeAdaptive | Row::HaeStarts => PairPlan::Adaptive {
                 start: Pairs::default(),
                 count: cell.pairs,
             },
@@ -153,6 +153,9 @@ impl Laboratory {
     /// [`Error`].
     pub fn run(&self, cell: &Cell, watch: &dyn Watch) -> Result<Outcome, Error> {
         let mut prepared = self.prepare(cell)?;
+        if cell.starts() > 1 {
+            return best_of_starts(cell, &mut prepared, watch);
+        }
         let fail = |source| failure(cell, source);
         let mut trainer =
             Trainer::new(&prepared.train, &prepared.targets, &prepared.settings).map_err(fail)?;
@@ -171,7 +174,7 @@ impl Laboratory {
                 break;
             }
         }
-        Ok(outcome(cell, &prepared, &trainer, trace, seconds))
+        Ok(outcome(cell, &prepared, &trainer.trained(), trace, seconds))
     }
 }
 
@@ -277,7 +280,7 @@ fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<
     let split = data::split(frames.rows, 0.6, cell.seed);
     let units = (Normalisation::identity(COUNT), Normalisation::gripper(4));
     let plan = match cell.row {
-        Row::HaeAdaptive => PairPlan::Adaptive {
+        Row::HaeAdaptive | Row::HaeStarts => PairPlan::Adaptive {
             start: Pairs::default(),
             count: cell.pairs,
         },
@@ -304,15 +307,59 @@ fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<
     })
 }
 
+/// Several starts, of which the best is taken; on one thread, as all cells are.
+fn best_of_starts(
+    cell: &Cell,
+    prepared: &mut Prepared,
+    watch: &dyn Watch,
+) -> Result<Outcome, Error> {
+    let begin = Instant::now();
+    let fail = |source| failure(cell, source);
+    let samples = (&prepared.train, &prepared.targets);
+    let several = cell.usual().several(cell.starts());
+    let mut starts = Starts::new(samples, &prepared.settings, several).map_err(fail)?;
+    let mut operator = InUnits {
+        operator: prepared.operator.as_mut(),
+        input: &prepared.units.0,
+        target: &prepared.units.1,
+    };
+    let mut before = 0;
+    let trained = starts.train_with(&mut operator, MOST_OFTEN, &mut |starts| {
+        let standing = starts.standing();
+        let spreads = standing.first.weights.attraction > 0.0;
+        watch.advance((standing.epochs - before) as f64 * cell.epoch_work(spreads));
+        before = standing.epochs;
+        match watch.stop() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
+        }
+    });
+    let trained = trained.map_err(fail)?.ok_or(Error::Stopped)?;
+    Ok(outcome(
+        cell,
+        prepared,
+        &trained,
+        Vec::new(),
+        begin.elapsed().as_secs_f64(),
+    ))
+}
+
 fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
+    let initialisation = match cell.row {
+        Row::HaeStarts => cell.usual().initialisation,
+        _ => cell.initialisation,
+    };
     Settings {
         cost: cell.row.cost(),
         lambda: Lambda {
             alpha: cell.row.alpha(),
             ..lambda
         },
-        schedule: cell.schedule,
-        initialisation: cell.initialisation,
+        schedule: match cell.row {
+            Row::HaeStarts => Schedule::Custom(cell.plan()),
+            _ => cell.schedule,
+        },
+        initialisation,
         // Cells run side by side: one thread each.
         threads: 1,
         ..Settings::shapes(plan, cell.seed)
@@ -336,11 +383,11 @@ impl Prepared {
 fn outcome(
     cell: &Cell,
     prepared: &Prepared,
-    trainer: &Trainer,
+    trained: &Trained,
     trace: Vec<(usize, Measures)>,
     seconds: f64,
 ) -> Outcome {
-    let networks = trainer.networks();
+    let networks = trained.networks.clone();
     let measures = prepared.measure(&networks.f);
     let invert = |units: &Normalisation, samples: &Matrix| {
         let mut raw = Matrix::default();
@@ -350,8 +397,8 @@ fn outcome(
         raw
     };
     let pairs = Pairs {
-        inputs: invert(&prepared.units.0, &trainer.pairs().inputs),
-        targets: invert(&prepared.units.1, &trainer.pairs().targets),
+        inputs: invert(&prepared.units.0, &trained.pairs.inputs),
+        targets: invert(&prepared.units.1, &trained.pairs.targets),
     };
     let (q, x) = prepared.units.clone();
     Outcome {
@@ -363,7 +410,7 @@ fn outcome(
             g: networks.g,
             q,
             x,
-            metadata: metadata(cell, prepared, &measures, trainer.epoch()),
+            metadata: metadata(cell, prepared, &measures, trained.epochs),
         },
         seconds,
     }

@@ -293,7 +293,9 @@ pub fn range(source: Source, row: Row, measure: usize) -> Option<(f64, f64)> {
         }
         (Source::Generated, Row::HaeAdaptive) => [ANY, from(0.92), (8.0, 14.0), ANY],
         (Source::Generated, Row::Pin | Row::CaePin) => [ANY, up_to(0.70), ANY, ANY],
-        (Source::Generated, row) if row != Row::HaeFixed => [ANY, from(0.90), ANY, ANY],
+        (Source::Generated, row) if !matches!(row, Row::HaeFixed | Row::HaeStarts) => {
+            [ANY, from(0.90), ANY, ANY]
+        }
         _ => return None,
     };
     ranges.get(measure).copied().filter(|&range| range != ANY)

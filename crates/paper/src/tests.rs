@@ -10,6 +10,7 @@ fn short() -> Schedule {
         stage_epochs: 3,
         cooling_epochs: 0,
         stage_rate: 1.0,
+        stage_reconstruction: 1.0,
         last_epochs: 6,
         ramp_start: 1,
         ramp_epochs: 2,
@@ -40,13 +41,14 @@ fn cells_are_trained_once_and_found_again_whatever_the_threads() {
         cell(sp2, Row::HaeAdaptive),
         cell(sp2, Row::HaeFixed),
         cell(Source::Generated, Row::HaeZero),
+        cell(Source::Generated, Row::HaeStarts),
     ];
     let heard = AtomicUsize::new(0);
     let done = |_: &Cell, _: &Kept| {
         heard.fetch_add(1, Ordering::Relaxed);
     };
     let first = run_all((&laboratory, &store), &cells, 2, &done, &|| false).unwrap();
-    assert_eq!(heard.load(Ordering::Relaxed), 4);
+    assert_eq!(heard.load(Ordering::Relaxed), 5);
     // Nothing is trained now: a laboratory that may not work finds all.
     let again = run_all((&laboratory, &store), &cells, 1, &done, &|| true).unwrap();
     assert_eq!(first, again);

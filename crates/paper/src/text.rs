@@ -4,7 +4,8 @@ use std::fmt::Write as _;
 
 use crate::plan::Frame;
 use crate::printed::{self, MEASURES};
-use crate::{Entry, Source, Table};
+use crate::{Cell, Entry, Row, Source, Table};
+use trainer::algorithm::Schedule;
 
 /// What the paper's text has lost, and what there is not.
 const NONE: &str = "—";
@@ -21,7 +22,7 @@ pub fn text(table: &Table, frame: &Frame) -> String {
     );
     let _ = writeln!(
         text,
-        "{:<16} {:<6}│ {:>8} ± {:<7} {:>8} │ {:>8} ± {:<7} │ our median lies in",
+        "{:<20} {:<6}│ {:>8} ± {:<7} {:>8} │ {:>8} ± {:<7} │ our median lies in",
         "cost", "", "mean", "dev.", "median", "paper", "dev."
     );
     let mut is_any_outside = false;
@@ -35,7 +36,7 @@ pub fn text(table: &Table, frame: &Frame) -> String {
             } else {
                 ""
             };
-            let _ = writeln!(text, "{name:<16} {} {}", padded(measure, 5), line(entry));
+            let _ = writeln!(text, "{name:<20} {} {}", padded(measure, 5), line(entry));
             is_any_outside |= entry.is_outside();
         }
     }
@@ -47,6 +48,17 @@ pub fn text(table: &Table, frame: &Frame) -> String {
             " with the paper's schedule and 5 repetitions or more: this run has less\n"
         });
     }
+    let ours = Cell::of_table(table.source, Row::HaeStarts, 1);
+    let schedule = match frame.schedule {
+        Schedule::Paper => ", fast schedule",
+        _ => "",
+    };
+    let _ = writeln!(
+        text,
+        "{}: N = {}{schedule}, not in the paper",
+        ours.row.title(),
+        ours.starts()
+    );
     for order in table.orders() {
         let holds = if order.holds {
             "holds"

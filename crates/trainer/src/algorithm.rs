@@ -11,12 +11,14 @@ pub mod checkpoint;
 mod clock;
 mod drive;
 mod settings;
+pub mod starts;
 #[cfg(test)]
 mod tests;
 
 pub use check::{Error, Warning};
 pub use drive::{InUnits, Nobody};
 pub use settings::{PairPlan, Plan, Schedule, Settings};
+pub use starts::{Answers, Several, Starts, start_seed};
 
 use crate::cost::engine::Engine;
 use crate::cost::reference::Autoencoder;
@@ -28,6 +30,7 @@ use crate::neighbours::{farthest, rows};
 use crate::network::Network;
 use crate::random::Random;
 use clock::Clock;
+use core::ops::Range;
 use core::time::Duration;
 
 /// Streams of random numbers of one seed.
@@ -243,6 +246,38 @@ impl Trainer {
         }
     }
 
+    /// Whether every pair that it will ask for is there.
+    fn has_all_pairs(&self) -> bool {
+        match &self.settings.pairs {
+            PairPlan::Fixed(_) => true,
+            PairPlan::Adaptive { start, count } => {
+                self.pairs.inputs.rows >= start.inputs.rows + count
+            }
+        }
+    }
+
+    /// Another pair in place of the one that it asks for.
+    fn take_pair(&mut self, input: &[f32], target: Vec<f32>) -> Result<(), Error> {
+        self.needs = Some(target);
+        self.show(input)
+    }
+
+    /// That it was ended after so many epochs, of which nothing else is known.
+    fn ended_after(&mut self, epoch: usize) {
+        self.epoch = epoch;
+    }
+
+    /// Threads for the coming steps; results do not depend on it.
+    fn set_threads(&mut self, threads: usize) {
+        self.engine.set_threads(threads.max(1));
+    }
+
+    /// How long these epochs will take at the speed so far.
+    fn seconds(&self, epochs: Range<usize>) -> f64 {
+        let clock = self.clock.as_ref();
+        clock.map_or(0.0, |clock| clock.seconds(self, epochs))
+    }
+
     /// The map is looked at when λ3 has just reached its full value, and at the end.
     fn is_look_due(&self) -> bool {
         let last = self.plan.stage_epochs * self.early_stages();
@@ -294,7 +329,12 @@ impl Trainer {
         let last = self.plan.stage_epochs * self.early_stages();
         let risen = epoch.saturating_sub(last + self.plan.ramp_start) as f64;
         let share = (risen / (self.plan.ramp_epochs.max(1) as f64)).min(1.0);
+        let reconstruction = match epoch < last {
+            true => self.plan.stage_reconstruction,
+            false => 1.0,
+        };
         Weights {
+            reconstruction: full.reconstruction * reconstruction,
             attraction: full.attraction * share,
             ..full
         }

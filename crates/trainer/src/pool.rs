@@ -125,6 +125,11 @@ impl Pool {
         }
     }
 
+    /// Threads that it was made with, the caller's own counted.
+    pub(crate) fn threads(&self) -> usize {
+        self.shared.left.len()
+    }
+
     /// Leaves the helpers out from now on, or takes them in again.
     pub(crate) fn set_alone(&mut self, alone: bool) {
         self.alone = alone;

@@ -20,6 +20,11 @@ impl Random {
         Self { bits }
     }
 
+    /// 64 random bits.
+    pub fn bits(&mut self) -> u64 {
+        self.bits.next_u64()
+    }
+
     /// Uniform in [0, 1), 24 bits.
     pub fn unit(&mut self) -> f32 {
         (self.bits.next_u32() >> 8) as f32 * (1.0 / 16_777_216.0)

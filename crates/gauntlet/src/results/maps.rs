@@ -20,6 +20,33 @@ pub enum Measures<'a> {
     Domains(&'a Measured),
 }
 
+/// One of the starts of a training.
+#[derive(Debug, Serialize)]
+pub struct Start {
+    /// Its seed, in decimal digits: beyond the whole numbers that a JSON reader keeps.
+    pub seed: String,
+    /// Epochs it was trained for: fewer where it was ended early.
+    pub epochs: usize,
+    /// What it cost on the training samples when it was judged last (Eq. 13 without Pin); `null` where its weights were no longer finite.
+    #[serde(serialize_with = "host::stats::number_or_null")]
+    pub cost: Option<f64>,
+    /// Whether it is the map.
+    pub taken: bool,
+}
+
+impl Start {
+    /// As the trainer tells them.
+    pub fn all(starts: &[trainer::algorithm::starts::Start]) -> Vec<Self> {
+        let start = |start: &trainer::algorithm::starts::Start| Self {
+            seed: start.seed.to_string(),
+            epochs: start.epochs,
+            cost: start.cost.filter(|cost| cost.is_finite()),
+            taken: start.is_live,
+        };
+        starts.iter().map(start).collect()
+    }
+}
+
 /// `train` to its end.
 #[derive(Debug, Serialize)]
 pub struct Trained<'a> {
@@ -31,6 +58,8 @@ pub struct Trained<'a> {
     pub pairs: usize,
     /// Seed of everything random.
     pub seed: u64,
+    /// All starts, in their order; one of them is the map.
+    pub starts: Vec<Start>,
     /// How long the training took, s.
     pub training_s: f64,
     /// What a person should know.

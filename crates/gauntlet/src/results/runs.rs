@@ -12,6 +12,7 @@ use host::session::{Stopped, Summary};
 use host::training::quality::Quality;
 
 use super::headings::Joint;
+use super::maps::Start;
 use crate::wearer::Fit;
 
 /// What is left of a run: `teleop`, `bridge engage`, `bridge monitor`, `bridge log`.
@@ -53,6 +54,8 @@ pub struct Demo<'a> {
     pub epochs: usize,
     /// Reference pairs.
     pub pairs: usize,
+    /// All starts of the training, in their order; one of them is the map.
+    pub starts: Vec<Start>,
     /// How good the map is.
     pub quality: &'a Quality,
     /// The virtual person in the glove; `null` with ideal sensors.

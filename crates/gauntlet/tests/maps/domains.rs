@@ -210,6 +210,58 @@ fn a_training_that_stops_and_goes_on_gives_the_same_model_bit_for_bit() {
 }
 
 #[test]
+fn several_starts_are_told_with_their_costs_and_go_on_from_a_checkpoint_bit_for_bit() {
+    let files = Files::new();
+    let words = ["--starts", "5", "--pairs", "1"];
+    let told =
+        |more: &[&str]| json(&files.train_with_truth(&[&words[..], more, &["--json"]].concat()));
+    let said = told(&[]);
+    let whole = std::fs::read(files.path("map.safetensors")).unwrap();
+    let starts = said["starts"].as_array().unwrap();
+    assert_eq!(starts.len(), 5);
+    assert_eq!(starts[0]["seed"], said["seed"].to_string());
+    let taken: Vec<_> = starts
+        .iter()
+        .filter(|start| start["taken"] == true)
+        .collect();
+    assert_eq!(taken.len(), 1);
+    assert_eq!(taken[0]["epochs"], said["epochs"]);
+    let cost = |start: &serde_json::Value| start["cost"].as_f64().unwrap();
+    let rivals = starts
+        .iter()
+        .filter(|start| start["epochs"] == said["epochs"]);
+    assert!(
+        rivals
+            .into_iter()
+            .all(|rival| cost(taken[0]) <= cost(rival)),
+        "{said}"
+    );
+    assert!(
+        starts
+            .iter()
+            .any(|start| start["epochs"].as_u64() < said["epochs"].as_u64())
+    );
+
+    let state = files.text_of("half.checkpoint");
+    // In the early stage, and after the first cut.
+    for epoch in ["213", "330"] {
+        let paused = told(&["--checkpoint", &state, "--stop-at", epoch]);
+        assert_eq!(paused["stopped_at_epoch"].to_string(), epoch);
+        assert_eq!(
+            told(&["--resume", &state, "--threads", "1"])["starts"],
+            said["starts"]
+        );
+        assert!(std::fs::read(files.path("map.safetensors")).unwrap() == whole);
+    }
+    let one = files.train_with_truth(&["--resume", &state, "--pairs", "1"]);
+    let said = refusal(&one, 1);
+    assert!(
+        said.contains("5 starts") && said.contains("--starts 5"),
+        "{said}"
+    );
+}
+
+#[test]
 fn ctrl_c_keeps_the_state_and_says_how_to_go_on() {
     let files = Files::new();
     let (q, x, truth) = (

@@ -91,6 +91,8 @@ fn the_shapes_files_train_as_any_two_domains() {
         "fast",
         "--epochs",
         "2",
+        "--starts",
+        "1",
         "--out",
         &out,
         "--json",
@@ -115,7 +117,7 @@ fn the_shapes_files_train_as_any_two_domains() {
                 "boundary:4",
                 "--json",
             ],
-            ["--schedule", "fast", "--epochs", "2", "--out"],
+            ["--starts", "1", "--epochs", "2", "--out"],
         ];
         let said = json(&run(&[&words.concat()[..], &[&out]].concat()));
         assert_eq!(said["pairs"], 4);

@@ -90,15 +90,7 @@ fn table_3_s_poses_are_named_and_a_file_of_pairs_is_taken() {
     let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
     let train = |words: &[&str]| {
         let mut all = vec![
-            "train",
-            "--poses",
-            poses,
-            "--out",
-            out,
-            "--schedule",
-            "fast",
-            "--epochs",
-            "5",
+            "train", "--poses", poses, "--out", out, "--starts", "1", "--epochs", "5",
         ];
         all.extend(words);
         run(&all)
@@ -157,17 +149,7 @@ fn a_hand_s_own_training_file_is_not_held_out() {
     let out = folder.path().join("m.safetensors");
     let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
     let words = [
-        "train",
-        "--poses",
-        poses,
-        "--out",
-        out,
-        "--schedule",
-        "fast",
-        "--epochs",
-        "5",
-        "--pairs",
-        "1",
+        "train", "--poses", poses, "--out", out, "--starts", "1", "--epochs", "5", "--pairs", "1",
     ];
     assert_eq!(run(&words).status.code(), Some(0));
     let output = run(&["eval", "--model", out, "--poses", poses, "--json"]);
@@ -192,15 +174,7 @@ fn a_joint_that_rests_is_warned_of_by_its_name() {
     std::fs::write(&poses, resting.join("\n")).unwrap();
     let out = folder.path().join("m.safetensors");
     let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
-    let words = [
-        "train",
-        "--poses",
-        poses,
-        "--out",
-        out,
-        "--schedule",
-        "fast",
-    ];
+    let words = ["train", "--poses", poses, "--out", out, "--starts", "1"];
     let more = ["--epochs", "5", "--pairs", "heuristic:2", "--json"];
     let said = json(&run(&[&words[..], &more].concat()));
     assert_eq!(said["pairs"], 2);

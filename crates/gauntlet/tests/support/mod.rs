@@ -170,6 +170,8 @@ fn train_model(kept: &Path) {
         "30",
         "--pairs",
         "1",
+        "--starts",
+        "1",
     ]);
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
     std::fs::rename(model, kept).unwrap();

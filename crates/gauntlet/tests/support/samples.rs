@@ -68,9 +68,12 @@ impl Files {
         write_pairs(self.path(name), pairs, &["q0", "q1"], &["x0", "x1"]).unwrap();
     }
 
-    /// `train` in a few epochs, with more words.
+    /// `train` in a few epochs, with more words; one start where they name no number.
     pub fn train(&self, words: &[&str]) -> std::process::Output {
         let mut all = vec!["--epochs", "40"];
+        if !words.contains(&"--starts") {
+            all.extend(["--starts", "1"]);
+        }
         all.extend(words);
         self.train_long(&all)
     }

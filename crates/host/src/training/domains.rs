@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use anyhow::Result;
+use trainer::algorithm::starts::Usual;
 use trainer::algorithm::{Nobody, PairPlan};
 use trainer::cost::Lambda;
 use trainer::data::{Columns, Matrix, Pairs, Table, sha256, split};
@@ -204,6 +205,7 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
         truth: truth.map(|truth| matching(&truth, &held_out)),
         training,
         held_out,
+        usual: Usual::of_target(target.values.cols),
         measuring: target.values.clone(),
         targets: target.values,
         coverage: request.coverage,

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use anyhow::Result;
 use glove::hand::{JOINT_NAMES, LIMITS};
+use trainer::algorithm::starts::{Start, Usual};
 use trainer::algorithm::{PairPlan, Schedule};
 use trainer::data::{Columns, Matrix, Pairs, Table, split};
 use trainer::hand::table3;
@@ -46,18 +47,24 @@ pub struct Request<'a> {
     pub start_pairs: bool,
     /// Of everything random.
     pub seed: u64,
+    /// As many starts as are likely to end within this time; `None`: one, whose map does not depend on the machine's speed.
+    pub within: Option<Duration>,
     /// Who hears of it.
     pub reporter: &'a dyn Reporter,
 }
 
 impl Request<'_> {
     fn course(&self) -> Course {
-        Course::hae(self.schedule, self.epochs, self.seed)
+        Course {
+            within: self.within,
+            starts: self.within.is_none().then_some(1),
+            ..Course::hae(self.schedule, self.epochs, self.seed)
+        }
     }
 
-    /// All epochs of all stages.
+    /// All epochs of all stages of a start.
     pub fn total_epochs(&self) -> usize {
-        let plan = self.course().plan(self.space.axes());
+        let plan = self.course().plan(self.space.axes(), &Usual::HAND);
         plan.stage_epochs * self.pairs + plan.last_epochs
     }
 }
@@ -75,6 +82,8 @@ pub struct Outcome {
     pub epochs: usize,
     /// Reference pairs used.
     pub pairs: usize,
+    /// All starts; the one in the running is taken.
+    pub starts: Vec<Start>,
 }
 
 /// Trains with adaptive pairs and the usual cost.
@@ -111,6 +120,7 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
         quality: Quality::from_measured(&measured, request.space),
         model,
         took: learned.took,
+        starts: learned.starts,
         epochs: learned.trained.epochs,
         pairs: learned.trained.pairs.inputs.rows,
     })
@@ -185,6 +195,7 @@ pub fn task(
         pairs,
         operator: Box::new(operator),
         lambda: space.lambda(),
+        usual: Usual::HAND,
         names: &JOINT_NAMES,
         pairs_from,
         measured_on: format!("{share} of {source}"),

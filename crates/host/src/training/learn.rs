@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use trainer::algorithm::{InUnits, Trainer};
+use trainer::algorithm::{InUnits, Starts};
 use trainer::remedy::Remedy;
 
 use super::task::{Course, Ended, Learned, Task};
@@ -19,6 +19,8 @@ use crate::report::{Nobody, Reporter};
 const KEEP_EVERY: Duration = Duration::from_secs(60);
 /// Epochs between two looks at the clock: often enough for a smooth bar and a prompt Ctrl-C.
 const LOOK_EVERY: usize = 10;
+/// Epochs from which the time of a training is estimated: its clock's first trial is over then.
+const TRIAL: usize = 20;
 
 /// Trains to the end, or to where it is to stop.
 ///
@@ -30,9 +32,9 @@ pub fn learn(
     reporter: &dyn Reporter,
     interrupt: &Interrupt,
 ) -> Result<Ended> {
-    let mut trainer = trainer(task, course)?;
+    let mut starts = starts(task, course)?;
     if let Some(path) = &course.resume {
-        trainer
+        starts
             .load_checkpoint(path)
             .map_err(|error| named(path, &error))?;
     }
@@ -42,7 +44,7 @@ pub fn learn(
         input: &units.q,
         target: &units.x,
     };
-    let total = trainer.total();
+    let total = starts.standing().total;
     let mut told_so_far = Told {
         progress: reporter.begin("training", total as u64),
         warnings: Vec::new(),
@@ -56,26 +58,26 @@ pub fn learn(
     } else {
         LOOK_EVERY
     };
-    let trained = trainer.train_with(&mut operator, each, &mut |trainer| {
-        for warning in trainer.take_warnings() {
-            told_so_far.tell(&warning, &trainer.progress());
+    let trained = starts.train_with(&mut operator, each, &mut |starts| {
+        for warning in starts.take_warnings() {
+            told_so_far.tell(&warning, &starts.standing().first);
         }
-        told_so_far.show(&trainer.progress());
+        told_so_far.show(&starts.standing());
         if interrupt.asked() {
             pause = Pause::Interrupt;
             return ControlFlow::Break(());
         }
-        if course.stop_at.is_some_and(|epoch| trainer.epoch() >= epoch) {
+        if course.stop_at.is_some_and(|epoch| starts.epoch() >= epoch) {
             pause = Pause::StopAt;
             return ControlFlow::Break(());
         }
         if let Some(path) = course.checkpoint.as_ref().filter(|_| kept.elapsed() >= KEEP_EVERY) {
             kept = Instant::now();
-            if let Err(error) = trainer.save_checkpoint(path) {
+            if let Err(error) = starts.save_checkpoint(path) {
                 // The training is worth more than its copy.
                 let what = format!(
                     "{error} (epoch {}): the training goes on, and is tried to be kept again in a minute",
-                    trainer.epoch()
+                    starts.epoch()
                 );
                 told_so_far.warn(Warning::new(what, error.remedy()));
             }
@@ -87,14 +89,15 @@ pub fn learn(
             trained,
             took: started.elapsed(),
             warnings: told_so_far.warnings,
+            starts: starts.starts(),
         })));
     }
     if let Some(path) = &course.checkpoint {
-        trainer.save_checkpoint(path).map_err(told)?;
+        starts.save_checkpoint(path).map_err(told)?;
     }
     match pause {
-        Pause::StopAt => Ok(Ended::StoppedAt(trainer.epoch())),
-        Pause::Interrupt => Err(broken_off(course, trainer.epoch())),
+        Pause::StopAt => Ok(Ended::StoppedAt(starts.epoch())),
+        Pause::Interrupt => Err(broken_off(course, starts.epoch())),
     }
 }
 
@@ -103,24 +106,39 @@ pub fn learn(
 /// # Errors
 /// A failure that says what is wrong with the data.
 pub(super) fn warnings(task: &Task, course: &Course) -> Result<Vec<Warning>> {
-    let mut trainer = trainer(task, course)?;
+    let mut starts = starts_of((task, course), 1)?;
     let mut said = Told {
         progress: Nobody.begin("looking at the data", 0),
         warnings: Vec::new(),
         names: task.names,
     };
-    for warning in trainer.take_warnings() {
-        said.tell(&warning, &trainer.progress());
+    for warning in starts.take_warnings() {
+        said.tell(&warning, &starts.standing().first);
     }
     Ok(said.warnings)
 }
 
-fn trainer(task: &Task, course: &Course) -> Result<Trainer> {
+/// As many starts as are asked for, or as end in time.
+fn starts(task: &Task, course: &Course) -> Result<Starts> {
+    let wanted = task.starts(course);
+    let count = match course.within {
+        Some(time) if wanted > 1 => {
+            let mut trial = starts_of((task, course), 1)?;
+            let _ = trial.advance(TRIAL).map_err(told)?;
+            wanted.min(trial.count_within(time))
+        }
+        _ => wanted,
+    };
+    starts_of((task, course), count)
+}
+
+fn starts_of((task, course): (&Task, &Course), count: usize) -> Result<Starts> {
     let (q, x) = (
         task.units.q.apply_all(&task.training),
         task.units.x.apply_all(&task.targets),
     );
-    Trainer::new(&q, &x, &course.settings(task)).map_err(told)
+    // Whoever answers is a script or a truth.
+    Starts::new((&q, &x), &course.settings(task), task.usual.several(count)).map_err(told)
 }
 
 /// Why a training ends before its end.

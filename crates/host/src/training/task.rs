@@ -5,6 +5,7 @@ use std::sync::mpsc::RecvTimeoutError;
 use std::time::Duration;
 
 use anyhow::Result;
+use trainer::algorithm::starts::{MOST, Start, Usual};
 use trainer::algorithm::{PairPlan, Plan, Schedule, Settings, Trained};
 use trainer::cost::{Cost, Lambda};
 use trainer::data::{Matrix, Pairs, sha256};
@@ -46,6 +47,8 @@ pub struct Task {
     pub(super) operator: Box<dyn Operator>,
     /// The factors of the cost where nothing else is said.
     pub(super) lambda: Lambda,
+    /// The starts where nothing else is said.
+    pub(super) usual: Usual,
     /// Names of the input's columns where it has better ones than numbers.
     pub(super) names: &'static [&'static str],
     /// In words: who answers for adaptive pairs, where others come from.
@@ -98,7 +101,11 @@ pub struct Course {
     /// Hidden units.
     pub hidden: usize,
     /// How the weights start.
-    pub initialisation: Initialisation,
+    pub initialisation: Option<Initialisation>,
+    /// Starts, of which the best is taken; one is the paper's way. None said: as many as usual.
+    pub starts: Option<usize>,
+    /// No more starts than are likely to end within this time; one in any case.
+    pub within: Option<Duration>,
     /// Of everything random.
     pub seed: u64,
     /// Threads.
@@ -122,7 +129,9 @@ impl Course {
             epochs,
             rate: None,
             hidden: HIDDEN,
-            initialisation: Initialisation::Glorot,
+            initialisation: None,
+            starts: None,
+            within: None,
             seed,
             threads: None,
             checkpoint: None,
@@ -131,8 +140,18 @@ impl Course {
         }
     }
 
-    pub(super) fn plan(&self, target_dimensions: usize) -> Plan {
+    /// How many starts: one with the paper's schedule and for its other costs.
+    pub(super) fn starts(&self, usual: &Usual) -> usize {
+        let is_ours = self.schedule != Schedule::Paper && self.cost == Cost::Hae;
+        let most = if is_ours { usual.count } else { 1 };
+        self.starts.unwrap_or(most).clamp(1, MOST)
+    }
+
+    pub(super) fn plan(&self, target_dimensions: usize, usual: &Usual) -> Plan {
         let mut plan = self.schedule.plan_for(target_dimensions);
+        if self.starts(usual) > 1 {
+            plan = usual.plan(plan);
+        }
         if let Some(epochs) = self.epochs {
             plan = plan.with_last_epochs(epochs);
         }
@@ -158,11 +177,20 @@ impl Course {
             attraction,
             alpha: self.alpha.unwrap_or(usual_alpha),
         };
-        settings.schedule = Schedule::Custom(self.plan(task.targets.cols));
+        settings.schedule = Schedule::Custom(self.plan(task.targets.cols, &task.usual));
         settings.answers = task.answers.clone();
         settings.hidden = self.hidden;
-        settings.initialisation = self.initialisation;
-        settings.threads = self.threads.unwrap_or(settings.threads);
+        let is_several = self.starts(&task.usual) > 1;
+        settings.initialisation = match self.initialisation {
+            Some(said) => said,
+            None if is_several => task.usual.initialisation,
+            None => Initialisation::Glorot,
+        };
+        let usual = match is_several {
+            true => std::thread::available_parallelism().map_or(1, usize::from),
+            false => settings.threads,
+        };
+        settings.threads = self.threads.unwrap_or(usual);
         settings
     }
 }
@@ -183,12 +211,19 @@ pub struct Learned {
     pub took: Duration,
     /// What a person should know.
     pub warnings: Vec<Warning>,
+    /// All starts; the one in the running is taken.
+    pub starts: Vec<Start>,
 }
 
 impl Task {
-    /// All epochs of all stages.
+    /// Starts of a training.
+    pub fn starts(&self, course: &Course) -> usize {
+        course.starts(&self.usual)
+    }
+
+    /// All epochs of all stages of one start.
     pub fn total_epochs(&self, course: &Course) -> usize {
-        let plan = course.plan(self.targets.cols);
+        let plan = course.plan(self.targets.cols, &self.usual);
         plan.stage_epochs * self.pairs.count() + plan.last_epochs
     }
 
@@ -292,6 +327,7 @@ impl Task {
             ("pairs", learned.trained.pairs.inputs.rows.to_string()),
             ("seed", settings.seed.to_string()),
             ("epochs", learned.trained.epochs.to_string()),
+            ("starts", learned.starts.len().to_string()),
             ("data_sha256", sha256(&[&self.inputs, &self.targets])),
             ("input_sha256", sha256(&[&self.inputs])),
             ("training_sha256", sha256(&[&sorted(&self.training)])),

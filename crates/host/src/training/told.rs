@@ -1,5 +1,6 @@
 //! What a person hears of a training: progress, and warnings once each.
 
+use trainer::algorithm::starts::Standing;
 use trainer::algorithm::{Progress as Step, Warning as OfTraining};
 
 use crate::next::Warning;
@@ -20,12 +21,17 @@ impl Told {
         self.warn(Warning::new(what, warning.remedy()));
     }
 
-    pub fn show(&mut self, step: &Step<'_>) {
+    pub fn show(&mut self, standing: &Standing<'_>) {
+        let step = &standing.first;
         let is_spreading = step.weights.attraction > 0.0;
         self.progress
-            .at(step.epoch as u64, Some(step.remaining), &|| {
+            .at(standing.epochs as u64, Some(standing.remaining), &|| {
+                let live = match standing.starts {
+                    1 => String::new(),
+                    starts => format!(", {} of {starts} starts", standing.live),
+                };
                 format!(
-                    "epoch {} of {}, {} pairs, cost {:.4}{}",
+                    "epoch {} of {}, {} pairs, cost {:.4}{}{live}",
                     step.epoch,
                     step.total,
                     step.pairs.inputs.rows,

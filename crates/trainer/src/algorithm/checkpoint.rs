@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 /// Version of this file's meaning.
 const VERSION: &str = "4";
-/// No checkpoint is longer; what has no end is none.
+/// No checkpoint of a start is longer; what has no end is none.
 const LONGEST: u64 = 256 << 20;
 /// The key of the digest over everything else.
 const DIGEST: &str = "state_sha256";
@@ -52,6 +52,14 @@ pub enum Error {
         "the checkpoint is of other settings (cost, lambda, pairs, schedule, hidden units or seed)"
     )]
     OtherSettings,
+    /// Of another number of starts.
+    #[error("the checkpoint is of a training with {}, this one has {expected}", starts(*found))]
+    OtherStarts {
+        /// In the file.
+        found: usize,
+        /// Of the training at hand.
+        expected: usize,
+    },
     /// Of other answers.
     #[error(
         "the checkpoint was made with other true pairs (--truth), which answer for its reference pairs"
@@ -68,12 +76,20 @@ impl Remedy for Error {
                 "use the samples it was made with, with the same seed and share held out".to_owned()
             }
             Self::OtherSettings => "use those it was made with".to_owned(),
+            Self::OtherStarts { found, .. } => format!("--starts {found}"),
             Self::OtherAnswers => "use those it was made with".to_owned(),
         }
     }
 }
 
-fn broken(why: impl Into<String>) -> Error {
+fn starts(count: usize) -> String {
+    match count {
+        1 => "one start".to_owned(),
+        more => format!("{more} starts"),
+    }
+}
+
+pub(super) fn broken(why: impl Into<String>) -> Error {
     Error::Broken { why: why.into() }
 }
 
@@ -82,7 +98,7 @@ pub(super) fn hexadecimal(bytes: &[u8]) -> String {
 }
 
 /// Over the words, in the order of their keys, and the arrays with their names and lengths.
-fn digest<'a>(
+pub(super) fn digest<'a>(
     words: impl Iterator<Item = (&'a str, &'a str)>,
     arrays: impl Iterator<Item = (&'a str, &'a [u8])>,
 ) -> String {
@@ -100,18 +116,35 @@ fn digest<'a>(
     hexadecimal(&hash.finalize())
 }
 
+pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
+    whole_file::write(path, bytes).map_err(|source| Error::File {
+        verb: "write",
+        file: path.to_owned(),
+        source,
+    })
+}
+
+/// The bytes of a checkpoint of so many starts.
+pub(super) fn read_file(path: &Path, starts: usize) -> Result<Vec<u8>, Error> {
+    let longest = LONGEST.saturating_mul(starts as u64);
+    let mut bytes = Vec::new();
+    std::fs::File::open(path)
+        .and_then(|file| file.take(longest).read_to_end(&mut bytes))
+        .map_err(|source| Error::File {
+            verb: "read",
+            file: path.to_owned(),
+            source,
+        })?;
+    Ok(bytes)
+}
+
 impl Trainer {
     /// Writes a checkpoint, whole or not at all.
     ///
     /// # Errors
     /// [`Error::File`].
     pub fn save_checkpoint(&self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
-        whole_file::write(path, &self.checkpoint()?).map_err(|source| Error::File {
-            verb: "write",
-            file: path.to_owned(),
-            source,
-        })
+        write_file(path.as_ref(), &self.checkpoint()?)
     }
 
     /// Goes on where a checkpoint of the same samples and settings stopped.
@@ -119,16 +152,7 @@ impl Trainer {
     /// # Errors
     /// Any of [`Error`]; then nothing has changed.
     pub fn load_checkpoint(&mut self, path: impl AsRef<Path>) -> Result<(), Error> {
-        let path = path.as_ref();
-        let mut bytes = Vec::new();
-        std::fs::File::open(path)
-            .and_then(|file| file.take(LONGEST).read_to_end(&mut bytes))
-            .map_err(|source| Error::File {
-                verb: "read",
-                file: path.to_owned(),
-                source,
-            })?;
-        self.resume(&bytes)
+        self.resume(&read_file(path.as_ref(), 1)?)
     }
 
     /// The checkpoint's bytes.

@@ -2,6 +2,7 @@
 //! own measured cost, and the dear ones are tried now and then before they come.
 
 use super::{Trainer, Weights};
+use core::ops::Range;
 use core::time::Duration;
 use std::time::Instant;
 
@@ -126,21 +127,29 @@ impl Clock {
     }
 
     pub(super) fn remaining(&self, trainer: &Trainer) -> Duration {
+        let seconds = self.seconds(trainer, trainer.epoch..trainer.total());
+        Duration::try_from_secs_f64(seconds).unwrap_or_default()
+    }
+
+    /// How long these epochs will take.
+    pub(super) fn seconds(&self, trainer: &Trainer, epochs: Range<usize>) -> f64 {
         let total = trainer.total();
         let attracts = trainer.weights(total.saturating_sub(1)).attraction != 0.0;
         let start = trainer.plan.stage_epochs * trainer.early_stages() + trainer.plan.ramp_start;
-        let with = if attracts {
-            total.saturating_sub(start.max(trainer.epoch))
-        } else {
-            0
+        let with_until = |end: usize| {
+            if attracts {
+                end.saturating_sub(start.max(epochs.start))
+            } else {
+                0
+            }
         };
+        let with = with_until(epochs.end);
         let cooling = trainer.plan.cooling_epochs;
-        let seconds = self.pace.left(&Ahead {
-            without: total - trainer.epoch - with,
+        self.pace.left(&Ahead {
+            without: epochs.len() - with,
             with,
-            settles: cooling > 0 && with > cooling / 2,
-        });
-        Duration::try_from_secs_f64(seconds).unwrap_or_default()
+            settles: cooling > 0 && with_until(total) > cooling / 2,
+        })
     }
 }
 

@@ -157,6 +157,9 @@ pub struct Plan {
     pub rate: LearningRate,
     /// The factor of the rate in all stages but the last.
     pub stage_rate: f64,
+    /// The factor of the reconstruction in all stages but the last: 1 in the paper. Without pairs it alone decides which way round
+    /// the image lies.
+    pub stage_reconstruction: f64,
     /// The last epochs, in which the rate falls in a straight line to nothing on top of that; 0: it does not.
     pub cooling_epochs: usize,
     /// Epochs of the last stage before λ3 leaves zero.
@@ -187,6 +190,7 @@ impl Schedule {
                 batches: 1,
                 cooling_epochs: 0,
                 stage_rate: 1.0,
+                stage_reconstruction: 1.0,
             },
             Self::Fast => Plan::fast(target_dimensions),
             Self::Custom(plan) => plan,
@@ -202,13 +206,19 @@ impl Plan {
             last_epochs,
             rate,
             stage_rate,
+            stage_reconstruction,
             cooling_epochs,
             ramp_start,
             ramp_epochs,
             batches,
         } = self;
+        // As the fingerprints of before this number were.
+        let reconstruction = match *stage_reconstruction {
+            1.0 => String::new(),
+            factor => format!(" reconstruction {factor}"),
+        };
         format!(
-            "{stage_epochs} {last_epochs} {} {} {} {stage_rate} {cooling_epochs} {ramp_start} {ramp_epochs} {batches}",
+            "{stage_epochs} {last_epochs} {} {} {} {stage_rate} {cooling_epochs} {ramp_start} {ramp_epochs} {batches}{reconstruction}",
             rate.initial, rate.decay, rate.decay_steps
         )
     }
@@ -223,6 +233,7 @@ impl Plan {
             0..=2 => Self {
                 stage_epochs: 300,
                 stage_rate: 1.0,
+                stage_reconstruction: 1.0,
                 last_epochs: 3000,
                 rate: rate(2e-3),
                 ramp_start: 800,
@@ -233,6 +244,7 @@ impl Plan {
             3 => Self {
                 stage_epochs: 200,
                 stage_rate: 2.0,
+                stage_reconstruction: 1.0,
                 last_epochs: 6000,
                 rate: rate(7e-4),
                 ramp_start: 1000,
@@ -245,6 +257,7 @@ impl Plan {
             _ => Self {
                 stage_epochs: 100,
                 stage_rate: 1.33,
+                stage_reconstruction: 1.0,
                 last_epochs: 2000,
                 rate: rate(1.5e-3),
                 ramp_start: 600,

@@ -6,7 +6,7 @@ use crate::optimizer::LearningRate;
 use core::ops::ControlFlow;
 
 /// A half disc bent into space, mapped to a rectangle: a few hundred samples.
-fn samples() -> (Matrix, Matrix) {
+pub(super) fn samples() -> (Matrix, Matrix) {
     let mut random = Random::new(11, 0);
     let (mut q, mut x) = (Matrix::default(), Matrix::default());
     for _ in 0..150 {
@@ -20,7 +20,7 @@ fn samples() -> (Matrix, Matrix) {
 }
 
 /// Answers with the point straight above.
-struct Above {
+pub(super) struct Above {
     asked: Vec<Vec<f32>>,
 }
 
@@ -32,16 +32,17 @@ impl Operator for Above {
     }
 }
 
-fn above() -> Above {
+pub(super) fn above() -> Above {
     Above { asked: Vec::new() }
 }
 
-fn short(batches: usize) -> Settings {
+pub(super) fn short(batches: usize) -> Settings {
     Settings {
         schedule: Schedule::Custom(Plan {
             stage_epochs: 10,
             cooling_epochs: 0,
             stage_rate: 1.0,
+            stage_reconstruction: 1.0,
             last_epochs: 120,
             rate: LearningRate {
                 initial: 2e-3,
@@ -114,7 +115,7 @@ fn training_covers_the_target_and_keeps_the_pairs() {
     assert!(trained.parts.target_chamfer < 0.03, "{:?}", trained.parts);
 }
 
-fn flat(trained: &Trained) -> Vec<u32> {
+pub(super) fn flat(trained: &Trained) -> Vec<u32> {
     let nets = [&trained.networks.f, &trained.networks.g];
     let arrays = nets.iter().flat_map(|net| net.arrays());
     arrays.flatten().map(|v| v.to_bits()).collect()

@@ -126,6 +126,13 @@ impl Engine {
         self.pair.set(q, x);
     }
 
+    /// So many threads from now on; results are the same.
+    pub(crate) fn set_threads(&mut self, threads: usize) {
+        if threads != self.pool.threads() {
+            (self.pool, self.pace) = (Pool::new(threads), Default::default());
+        }
+    }
+
     /// The networks as they stand.
     pub(crate) fn networks(&self) -> Autoencoder {
         Autoencoder {

@@ -11,6 +11,7 @@ use std::time::Instant;
 use anyhow::Result;
 
 use crate::progress::Person;
+use crate::results::maps::Start;
 use crate::results::{self, runs};
 use crate::run::{End, Finished, Options, Run};
 use crate::tell::Tell;
@@ -81,6 +82,7 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
             training_s: outcome.took.as_secs_f64(),
             epochs: outcome.epochs,
             pairs: outcome.pairs,
+            starts: Start::all(&outcome.starts),
             quality: &outcome.quality,
             person: person.as_ref(),
             flash: flashed.as_ref(),

@@ -14,6 +14,7 @@ use trainer::hand::Space;
 
 use super::args::Demo;
 use crate::commands::simulate;
+use crate::commands::train::taken;
 use crate::played;
 use crate::progress::Person;
 use crate::results::runs;
@@ -34,6 +35,8 @@ use host::training::{Outcome, Request, train};
 
 /// Reference pairs chosen one after another.
 const PAIRS: usize = 8;
+/// As many starts as are likely to end within this time.
+const TRAINING: Duration = Duration::from_secs(8);
 
 /// What both homes of the bridge are started with.
 #[derive(Clone, Copy)]
@@ -89,6 +92,7 @@ pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
         pairs: PAIRS,
         start_pairs: !options.no_start_pairs,
         seed: options.seed,
+        within: Some(TRAINING),
         reporter: &Person,
     };
     tell.say(format_args!(
@@ -108,7 +112,11 @@ pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
         request.total_epochs()
     ));
     let outcome = train(&request, interrupt)?;
-    tell.say(format_args!("trained    in {}", seconds(outcome.took)));
+    tell.say(format_args!(
+        "trained    in {}{}",
+        seconds(outcome.took),
+        taken(&outcome.starts)
+    ));
     tell.say(format_args!("quality    {}", outcome.quality.line()));
     require_good(&outcome.quality)?;
     Ok(outcome)

@@ -72,6 +72,7 @@ const QUICK: algorithm::Plan = algorithm::Plan {
     stage_epochs: 30,
     cooling_epochs: 0,
     stage_rate: 1.0,
+    stage_reconstruction: 1.0,
     last_epochs: 250,
     rate: LearningRate {
         initial: 2e-3,

@@ -9,6 +9,7 @@ use anyhow::Result;
 
 pub(in crate::commands) use args::deviation;
 pub use args::{CoverageArgs, Schedule, Train};
+pub(in crate::commands) use show::taken;
 
 use crate::progress::Person;
 use crate::results::{self, maps};
@@ -56,6 +57,7 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
             epochs: learned.trained.epochs,
             pairs: learned.trained.pairs.inputs.rows,
             seed: options.seed,
+            starts: maps::Start::all(&learned.starts),
             training_s: learned.took.as_secs_f64(),
             warnings: &learned.warnings,
             quality: match is_hand {
@@ -66,7 +68,11 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
         };
         return results::print("train", trained);
     }
-    tell.say(format_args!("trained    in {}", seconds(learned.took)));
+    tell.say(format_args!(
+        "trained    in {}{}",
+        seconds(learned.took),
+        show::taken(&learned.starts)
+    ));
     let lines = if is_hand {
         vec![quality.line()]
     } else {

@@ -4,7 +4,6 @@ use std::path::Path;
 
 use anyhow::Result;
 use trainer::hand::Space;
-use trainer::network::Initialisation;
 
 use super::args::Train;
 use crate::progress::Person;
@@ -79,9 +78,9 @@ pub(super) fn course(options: &Train) -> Course {
         epochs: options.epochs.map(|epochs| epochs as usize),
         rate: options.rate,
         hidden: options.hidden as usize,
-        initialisation: options
-            .normal
-            .map_or(Initialisation::Glorot, Initialisation::Normal),
+        initialisation: options.normal,
+        starts: options.starts.map(usize::from),
+        within: None,
         seed: options.seed,
         threads: options.threads.map(usize::from),
         checkpoint: options

@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
+use trainer::algorithm::starts::Start;
 use trainer::hand::table3::POSES;
 
 use super::args::Train;
@@ -19,6 +20,12 @@ pub(super) fn describe(options: &Train, task: &Task, course: &Course, tell: &Tel
         course.cost.name(),
         task.describe_pairs()
     ));
+    let starts = task.starts(course);
+    if starts > 1 {
+        tell.say(format_args!(
+            "starts     {starts}; those that cost most end early, the cheapest on the training samples is taken"
+        ));
+    }
     if options
         .pairs
         .is_some_and(|choice| choice.kind == PairKind::Table3)
@@ -29,6 +36,25 @@ pub(super) fn describe(options: &Train, task: &Task, course: &Course, tell: &Tel
                 pose.index, pose.name, pose.counts
             ));
         }
+    }
+}
+
+/// Which of several starts was taken, and what they cost; empty for one.
+pub(in crate::commands) fn taken(starts: &[Start]) -> String {
+    let Some((number, taken)) = starts.iter().enumerate().find(|(_, start)| start.is_live) else {
+        return String::new();
+    };
+    let cost = |start: &Start| start.cost.unwrap_or(f64::NAN);
+    let whole = starts.iter().filter(|start| start.epochs == taken.epochs);
+    let dearest = whole.clone().map(cost).fold(f64::NAN, f64::max);
+    match starts.len() {
+        0 | 1 => String::new(),
+        count => format!(
+            "; start {} of {count} is taken, of {} that came to the end: cost {:.4}, the others up to {dearest:.4}",
+            number + 1,
+            whole.count(),
+            cost(taken)
+        ),
     }
 }
 

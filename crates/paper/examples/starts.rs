@@ -1,0 +1,206 @@
+//! Many starts of one training: what each costs on the way and at its end, and what its map is worth. From this follow how many starts
+//! are worth while, when they can be told apart, and by what.
+//!
+//! `cargo run --release -p paper --example starts -- sp2 fast 1-8 12 0.03 >> starts.csv`: data (sp1 to sp4, hand, or a recording),
+//! schedule (`fast`, `paper`, or `fast,NAME=VALUE,…`), seeds, starts a seed, deviation of normal weights or `glorot`. One line for each
+//! look at each start: at the end of the early stages, before λ3 rises, half risen, risen, thrice between, and at the end; with the
+//! measures of its end on held-out samples. With `best12` for the starts they are trained as `train` does, one line a seed.
+
+#[path = "common/domain.rs"]
+mod domain;
+
+use core::ops::ControlFlow;
+use domain::{Domain, Result, domain};
+use std::time::Instant;
+use trainer::algorithm::starts::Usual;
+use trainer::algorithm::{InUnits, Plan, Schedule, Settings, Starts, Trainer, start_seed};
+use trainer::cost::fast::evaluate;
+use trainer::data::Pairs;
+use trainer::measures::{NEIGHBOURS, fold_factor, measure, occupancy};
+use trainer::network::Initialisation;
+
+/// The columns of a line for each look, and of one for each seed.
+const EACH: &str =
+    "data,schedule,normal,seed,start,epoch,recon,dist,ucdx,ucdq,votrain,fold,s,pin,d,vo,dknn,nmse";
+const BEST: &str = "data,schedule,normal,seed,starts,taken,d,vo,dknn,nmse,s,costs";
+
+fn plan(word: &str, dimensions: usize) -> Result<Plan> {
+    let mut words = word.split(',');
+    let mut plan = match words.next() {
+        Some("paper") => Schedule::Paper.plan_for(dimensions),
+        _ => Schedule::Fast.plan_for(dimensions),
+    };
+    for word in words {
+        let (name, value) = word.split_once('=').ok_or("NAME=VALUE")?;
+        let number: f64 = value.parse()?;
+        match name {
+            "m1" => plan.stage_epochs = number as usize,
+            "m2" => plan.last_epochs = number as usize,
+            "rate" => plan.rate.initial = number,
+            "stage_rate" => plan.stage_rate = number,
+            "recon" => plan.stage_reconstruction = number,
+            "start" => plan.ramp_start = number as usize,
+            "ramp" => plan.ramp_epochs = number as usize,
+            "batches" => plan.batches = number as usize,
+            "cool" => plan.cooling_epochs = number as usize,
+            _ => return Err(format!("unknown part of a schedule: {name}").into()),
+        }
+    }
+    Ok(plan)
+}
+
+fn list(row: &[f32]) -> Vec<f64> {
+    row.iter().map(|v| f64::from(*v)).collect()
+}
+
+/// The epochs at which a training is looked at.
+fn looks(plan: &Plan, pairs: usize) -> Vec<usize> {
+    let early = plan.stage_epochs * pairs;
+    let risen = early + plan.ramp_start + plan.ramp_epochs;
+    let total = early + plan.last_epochs;
+    let part = |share: f64| risen + (share * (total - risen) as f64) as usize;
+    let half_risen = early + plan.ramp_start + plan.ramp_epochs / 2;
+    vec![
+        early,
+        early + plan.ramp_start,
+        half_risen,
+        risen,
+        part(0.25),
+        part(0.5),
+        part(0.75),
+        total,
+    ]
+}
+
+/// One start, with a line for each look.
+fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
+    let looks = looks(&settings.schedule.plan(), settings.pairs.count());
+    let begin = Instant::now();
+    let mut trainer = Trainer::new(&domain.train, &domain.targets, settings)?;
+    let full = settings.cost.weights(&settings.lambda);
+    let train: Vec<Vec<f64>> = domain.train.iter_rows().map(list).collect();
+    let targets: Vec<Vec<f64>> = domain.targets.iter_rows().map(list).collect();
+    let each = looks.iter().fold(0, |a, b| gcd(a, *b)).max(1);
+    let mut rows = Vec::new();
+    let mut operator = InUnits {
+        operator: domain.operator.as_mut(),
+        input: &domain.units.0,
+        target: &domain.units.1,
+    };
+    trainer.train_with(&mut operator, each, &mut |trainer| {
+        if looks.contains(&trainer.epoch()) {
+            let networks = trainer.networks();
+            let (parts, _) = evaluate(
+                &networks,
+                (&domain.train, &domain.targets),
+                &Pairs::default(),
+                &full,
+                1,
+            );
+            let f = networks.f.cast::<f64>();
+            let images: Vec<Vec<f64>> = train.iter().map(|q| f.eval(q)).collect();
+            let epsilon = domain.coverage.epsilon(train.len()).unwrap_or(f64::NAN);
+            let row = [
+                parts.reconstruction,
+                parts.distortion,
+                parts.target_chamfer,
+                parts.input_chamfer,
+                occupancy(&images, &targets, epsilon),
+                fold_factor(&train, &images, NEIGHBOURS),
+                begin.elapsed().as_secs_f64(),
+            ];
+            rows.push((trainer.epoch(), row, trainer.progress().parts.pin));
+        }
+        ControlFlow::Continue(())
+    })?;
+    let m = measure(&trainer.networks().f, &domain.test());
+    for (epoch, row, pin) in &rows {
+        let row: Vec<String> = row.iter().map(|v| format!("{v:.5}")).collect();
+        println!(
+            "{label},{epoch},{},{pin:.5},{:.4},{:.4},{:.4},{:.4}",
+            row.join(","),
+            m.distortion,
+            m.occupancy.unwrap_or(f64::NAN),
+            m.dissimilarity,
+            m.nmse.unwrap_or(f64::NAN)
+        );
+    }
+    Ok(())
+}
+
+/// The machine itself: the map that is taken of so many starts, and what each start cost when it was judged last.
+fn best(domain: &mut Domain, settings: &Settings, count: usize, label: &str) -> Result<()> {
+    let begin = Instant::now();
+    let usual = match domain.truth {
+        Some(_) => Usual::of_target(domain.targets.cols),
+        None => Usual::HAND,
+    };
+    let mut starts = Starts::new(
+        (&domain.train, &domain.targets),
+        settings,
+        usual.several(count),
+    )?;
+    let mut operator = InUnits {
+        operator: domain.operator.as_mut(),
+        input: &domain.units.0,
+        target: &domain.units.1,
+    };
+    let go_on = &mut |_: &mut Starts| ControlFlow::Continue(());
+    let trained = starts
+        .train_with(&mut operator, 10, go_on)?
+        .ok_or("stopped")?;
+    let m = measure(&trained.networks.f, &domain.test());
+    let costs: Vec<String> = (starts.starts().iter())
+        .map(|start| format!("{}:{:.5}", start.epochs, start.cost.unwrap_or(f64::NAN)))
+        .collect();
+    let taken = starts.starts().iter().position(|start| start.is_live);
+    println!(
+        "{label},{},{:.4},{:.4},{:.4},{:.4},{:.2},{}",
+        taken.unwrap_or(count),
+        m.distortion,
+        m.occupancy.unwrap_or(f64::NAN),
+        m.dissimilarity,
+        m.nmse.unwrap_or(f64::NAN),
+        begin.elapsed().as_secs_f64(),
+        costs.join(" ")
+    );
+    Ok(())
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}
+
+fn main() -> Result<()> {
+    let words: Vec<String> = std::env::args().skip(1).collect();
+    let [data, schedule, seeds, starts, normal] = &words[..] else {
+        return Err("DATA SCHEDULE SEEDS STARTS DEVIATION|glorot".into());
+    };
+    let (first, last) = seeds.split_once('-').unwrap_or((seeds, seeds));
+    let (each, count) = match starts.strip_prefix("best") {
+        Some(count) => (false, count.parse::<usize>()?),
+        None => (true, starts.parse()?),
+    };
+    println!("{}", if each { EACH } else { BEST });
+    for seed in first.parse::<u64>()?..=last.parse::<u64>()? {
+        for number in 0..if each { count } else { 1 } {
+            let mut domain = domain(data, seed)?;
+            let mut settings = domain.settings.clone();
+            let plan = plan(schedule, domain.targets.cols)?;
+            settings.schedule = Schedule::Custom(plan);
+            settings.threads = 1;
+            settings.seed = start_seed(seed, number);
+            if let Ok(deviation) = normal.parse() {
+                settings.initialisation = Initialisation::Normal(deviation);
+            }
+            let name = data.rsplit('/').next().unwrap_or(data);
+            let label = format!("{name},{},{normal},{seed}", schedule.replace(',', ";"));
+            if each {
+                start(&mut domain, &settings, &format!("{label},{number}"))?;
+            } else {
+                best(&mut domain, &settings, count, &format!("{label},{count}"))?;
+            }
+        }
+    }
+    Ok(())
+}

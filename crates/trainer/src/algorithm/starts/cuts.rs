@@ -1,0 +1,139 @@
+//! When starts are judged, and how many go on.
+
+use crate::algorithm::Plan;
+use core::ops::Range;
+
+/// A look at all starts in the running, after which only the best go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Cut {
+    /// After this epoch of each.
+    pub epoch: usize,
+    /// So many go on.
+    pub keep: usize,
+    /// Whether the attraction counts: not before λ3 has begun to rise, when nothing has worked on it yet.
+    pub attraction: bool,
+}
+
+impl Cut {
+    /// The cuts of a training with this plan, `pairs` early stages and `count` starts; the last at its end, where one is kept.
+    ///
+    /// Where λ3 is about to rise, reconstruction and distortion show the maps that the pairs have creased: an eighth of the time is
+    /// spent then. Half risen, the whole cost begins to say which will be cheap; at the full λ3 the order is nearly that of the end
+    /// (docs/measurements/starts.md).
+    #[must_use]
+    pub fn all(plan: &Plan, pairs: usize, count: usize) -> Vec<Self> {
+        let last = plan.stage_epochs * pairs;
+        let total = last + plan.last_epochs;
+        let before = (last + plan.ramp_start).min(total);
+        let rising = (last + plan.ramp_start + plan.ramp_epochs / 2).min(total);
+        let risen = (last + plan.ramp_start + plan.ramp_epochs).min(total);
+        let half = risen + (total - risen) / 2;
+        let cuts = [
+            (before, (2 * count).div_ceil(3)),
+            (rising, count.div_ceil(2)),
+            (risen, count.div_ceil(6)),
+            (half, count.div_ceil(12)),
+            (total, 1),
+        ];
+        let mut live = count.max(1);
+        let mut kept: Vec<Self> = Vec::new();
+        for (epoch, keep) in cuts {
+            let follows = kept.last().is_none_or(|cut| cut.epoch < epoch);
+            if (keep < live && follows && epoch > 0) || epoch == total {
+                kept.retain(|cut| cut.epoch < epoch);
+                kept.push(Self {
+                    epoch,
+                    keep,
+                    attraction: epoch > before,
+                });
+                live = keep;
+            }
+        }
+        kept
+    }
+}
+
+/// Epochs and starts of each stretch between two cuts.
+fn stretches(cuts: &[Cut], count: usize) -> impl Iterator<Item = (Range<usize>, usize)> {
+    let mut before = (0, count);
+    cuts.iter().map(move |cut| {
+        let (from, count) = core::mem::replace(&mut before, (cut.epoch, cut.keep));
+        (from..cut.epoch, count)
+    })
+}
+
+/// Epochs of all starts together, from the first to the last.
+pub(super) fn epochs(cuts: &[Cut], count: usize) -> usize {
+    stretches(cuts, count)
+        .map(|(epochs, count)| count * epochs.len())
+        .sum()
+}
+
+/// A second thread of a start is worth so much of the first (docs/measurements/trainer.md: 5.2 s for 9.1).
+const HELPER: f64 = 0.75;
+
+/// How long `count` starts take from an epoch on, after so many cuts were made, on so many threads; `alone` tells it of one start on
+/// `now` threads.
+pub(super) fn seconds(
+    (cuts, count): (&[Cut], usize),
+    (made, epoch): (usize, usize),
+    (threads, now): (usize, usize),
+    alone: &dyn Fn(Range<usize>) -> f64,
+) -> f64 {
+    let speed = |threads: usize| 1.0 + HELPER * (threads.max(1) - 1) as f64;
+    let stretch = |(epochs, count): (Range<usize>, usize)| {
+        let left = epochs.start.max(epoch)..epochs.end.max(epoch);
+        // As long as the slowest of the threads takes for its share.
+        let turns = count.div_ceil(threads.max(1)) as f64;
+        turns * alone(left) * speed(now) / speed(threads / count.max(1))
+    };
+    stretches(cuts, count).skip(made).map(stretch).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::algorithm::Schedule;
+
+    #[test]
+    fn fewer_starts_go_on_after_each_cut_and_one_is_left_at_the_end() {
+        for count in 1..40 {
+            for schedule in [Schedule::Fast, Schedule::Paper] {
+                let plan = schedule.plan_for(2);
+                let cuts = Cut::all(&plan, 4, count);
+                assert!(
+                    cuts.windows(2)
+                        .all(|w| w[0].epoch < w[1].epoch && w[0].keep >= w[1].keep)
+                );
+                let total = 4 * plan.stage_epochs + plan.last_epochs;
+                assert_eq!(
+                    cuts.last(),
+                    Some(&Cut {
+                        epoch: total,
+                        keep: 1,
+                        attraction: true
+                    })
+                );
+            }
+        }
+        assert_eq!(Cut::all(&Schedule::Fast.plan_for(2), 4, 1).len(), 1);
+    }
+
+    #[test]
+    fn two_starts_on_two_threads_take_the_first_stretch_at_once_and_help_each_other_in_the_second()
+    {
+        let cut = |epoch| Cut {
+            epoch,
+            keep: 1,
+            attraction: true,
+        };
+        let cuts = [cut(100), cut(300)];
+        let alone = |epochs: Range<usize>| epochs.len() as f64;
+        let whole = |count, threads| seconds((&cuts, count), (0, 0), (threads, 1), &alone);
+        assert_eq!(whole(1, 1), 300.0);
+        assert_eq!(whole(2, 1), 400.0);
+        assert!((whole(2, 2) - (100.0 + 200.0 / 1.75)).abs() < 1e-9);
+        assert_eq!(seconds((&cuts, 2), (1, 250), (1, 1), &alone), 50.0);
+        assert_eq!(epochs(&cuts, 2), 400);
+    }
+}

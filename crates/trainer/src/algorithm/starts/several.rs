@@ -1,0 +1,77 @@
+//! How many starts, how they are answered and judged, and what is told of them.
+
+use crate::algorithm::Progress;
+use core::time::Duration;
+
+/// Most starts of a training.
+pub const MOST: usize = 64;
+
+/// Who answers when a start asks for a pair.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Answers {
+    /// Whoever answers does so at no cost, a script or a truth: each start asks for pairs of its own.
+    ForEach,
+    /// A person, who shows each pose once: the first start asks, and the others take its pairs, each in an order of its own
+    /// (the pair whose target is nearest to the one it would ask for).
+    Once,
+}
+
+/// By what starts are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Judge {
+    /// Eq. 13 without Pin.
+    Cost,
+    /// The same with α = 0, so that nothing is measured in the input domain but the reconstruction. For inputs of many more dimensions
+    /// than targets: what of them lies off any image of g makes up most of UCD(Q, g(X)), and says nothing of f.
+    CostInTarget,
+}
+
+/// How many starts, who answers them, and by what they are judged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Several {
+    /// Starts, at least one.
+    pub count: usize,
+    /// Who shows pairs.
+    pub answers: Answers,
+    /// By what they are judged.
+    pub judge: Judge,
+}
+
+impl Several {
+    /// One start: Algorithm 1 as it stands.
+    pub const ONE: Self = Self {
+        count: 1,
+        answers: Answers::ForEach,
+        judge: Judge::Cost,
+    };
+}
+
+/// What became of a start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// Its seed.
+    pub seed: u64,
+    /// Epochs done.
+    pub epochs: usize,
+    /// What it cost when it was judged last; infinite where its weights were no longer finite, `None` before the first time.
+    pub cost: Option<f64>,
+    /// Whether it is still in the running; at the end the one that is taken.
+    pub is_live: bool,
+}
+
+/// Where all starts stand.
+#[derive(Clone, Debug)]
+pub struct Standing<'a> {
+    /// The first start that is still in the running.
+    pub first: Progress<'a>,
+    /// Starts in the running.
+    pub live: usize,
+    /// All starts.
+    pub starts: usize,
+    /// Epochs done by all starts together.
+    pub epochs: usize,
+    /// Of how many.
+    pub total: usize,
+    /// How long the rest will take at the speed so far.
+    pub remaining: Duration,
+}
