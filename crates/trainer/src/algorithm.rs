@@ -11,6 +11,7 @@ pub mod checkpoint;
 mod clock;
 mod drive;
 mod settings;
+mod taught;
 #[cfg(test)]
 mod tests;
 

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
-use super::prompts::{GUIDED, Prompt, again, free};
+use host::training::prompts::{GUIDED, Prompt, again, free};
 use crate::out;
 use crate::progress::Progress;
 use crate::results::gloves;
