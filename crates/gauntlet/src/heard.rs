@@ -113,7 +113,9 @@ mod tests {
             [Task::Fists, Task::Thumb, Task::Free, Task::Flat]
         );
         assert_eq!(task("move"), Some(Task::Use(Attitude::PalmDown)));
-        let shown = task(&virtual_person::request_to_show(&[255.0, 0.0, 12.34, 130.0]));
+        let shown = task(&virtual_person::request_to_show(&[
+            255.0, 0.0, 12.34, 130.0,
+        ]));
         assert!(matches!(shown, Some(Task::Posture(angles)) if angles[3] > 0.5));
         for other in ["show", "show 1 2", "show 1 x", "show nan 1 2 3"] {
             assert_eq!(task(other), None, "{other}");

@@ -115,7 +115,9 @@ impl TeachView {
                 ask.all_left.as_secs() + 1
             ),
             Doing::Poses(ask) => match (ask.state, ask.start) {
-                (State::Trying, _) => "move the hand: this is what the map makes of it so far".to_owned(),
+                (State::Trying, _) => {
+                    "move the hand: this is what the map makes of it so far".to_owned()
+                }
                 (State::Choosing | State::Finished, _) => String::new(),
                 (_, Some(0)) => format!("open your hand, as you will for this: {}", self.words),
                 (_, Some(_)) => format!("make a fist, as you will for this: {}", self.words),
@@ -169,14 +171,19 @@ impl Scene for TeachView {
         let drawn = area.width >= DRAWN.0 && area.height >= DRAWN.1;
         let (state, color) = self.state();
         let head = Line::from(vec![
-            Span::styled(format!(" {state} "), Style::new().fg(Color::Black).bg(color)),
+            Span::styled(
+                format!(" {state} "),
+                Style::new().fg(Color::Black).bg(color),
+            ),
             Span::raw(format!("  {}  {}", self.place(), seconds(self.elapsed))),
         ]);
         let prompt = wrapped(&self.prompt(), area.width);
         let said = self.said.as_ref().map_or(Vec::new(), |(text, good)| {
             let color = if *good { Color::Green } else { Color::Yellow };
             let lines = wrapped(text, area.width).into_iter();
-            lines.map(|line| Line::styled(line, Style::new().fg(color))).collect()
+            lines
+                .map(|line| Line::styled(line, Style::new().fg(color)))
+                .collect()
         });
         let keys = key_lines(self.keys, area.width);
         let length = |lines: usize| Constraint::Length(lines.try_into().unwrap_or(u16::MAX));
@@ -185,7 +192,11 @@ impl Scene for TeachView {
             Constraint::Length(1),
             length(prompt.len()),
             Constraint::Length(1),
-            if drawn { Constraint::Fill(1) } else { Constraint::Length(0) },
+            if drawn {
+                Constraint::Fill(1)
+            } else {
+                Constraint::Length(0)
+            },
             length(bars),
             length(said.len().max(1)),
             Constraint::Length(1),
@@ -193,7 +204,10 @@ impl Scene for TeachView {
         ])
         .areas(area);
         frame.render_widget(Paragraph::new(head), top);
-        let prompt: Vec<Line<'_>> = prompt.into_iter().map(|line| Line::styled(line, BOLD)).collect();
+        let prompt: Vec<Line<'_>> = prompt
+            .into_iter()
+            .map(|line| Line::styled(line, BOLD))
+            .collect();
         frame.render_widget(Paragraph::new(prompt), asked);
         frame.render_widget(Paragraph::new(self.gauge(area.width)), gauge);
         let halves = Layout::horizontal([Constraint::Fill(1), Constraint::Fill(1)]);
@@ -219,7 +233,9 @@ impl Scene for TeachView {
 
 /// A sketch in braille dots, as large as the place allows with its own proportions (a character is twice as high as wide).
 fn draw_sketch(frame: &mut Frame<'_>, area: Rect, sketch: &Sketch) {
-    let width = area.width.min((f32::from(area.height) * 2.0 / Sketch::ASPECT) as u16);
+    let width = area
+        .width
+        .min((f32::from(area.height) * 2.0 / Sketch::ASPECT) as u16);
     let area = Rect {
         x: area.x + (area.width - width) / 2,
         width,
@@ -231,12 +247,19 @@ fn draw_sketch(frame: &mut Frame<'_>, area: Rect, sketch: &Sketch) {
         .y_bounds([0.0, 1.0])
         .paint(|context| {
             // The white rims that tell lines apart on paper would wipe out nothing here.
-            let drawn = sketch.strokes.iter().filter(|stroke| stroke.colour != [255, 255, 255]);
+            let drawn = sketch
+                .strokes
+                .iter()
+                .filter(|stroke| stroke.colour != [255, 255, 255]);
             for stroke in drawn {
                 let [red, green, blue] = stroke.colour;
                 let color = match stroke.width {
                     0 => Color::DarkGray,
-                    _ => Color::Rgb(red.saturating_add(60), green.saturating_add(60), blue.saturating_add(60)),
+                    _ => Color::Rgb(
+                        red.saturating_add(60),
+                        green.saturating_add(60),
+                        blue.saturating_add(60),
+                    ),
                 };
                 let ends = stroke.points.windows(2).map(|pair| (pair[0], pair[1]));
                 let closing = match (stroke.points.first(), stroke.points.last()) {
@@ -244,7 +267,13 @@ fn draw_sketch(frame: &mut Frame<'_>, area: Rect, sketch: &Sketch) {
                     _ => None,
                 };
                 for ((x1, y1), (x2, y2)) in ends.chain(closing) {
-                    context.draw(&Stroke { x1, y1, x2, y2, color });
+                    context.draw(&Stroke {
+                        x1,
+                        y1,
+                        x2,
+                        y2,
+                        color,
+                    });
                 }
             }
         });
@@ -285,7 +314,9 @@ mod tests {
         terminal.draw(|frame| view.draw(frame)).unwrap();
         let buffer = terminal.backend().buffer();
         let line = |row: u16| -> String {
-            (0..width).map(|column| buffer[(column, row)].symbol().to_owned()).collect()
+            (0..width)
+                .map(|column| buffer[(column, row)].symbol().to_owned())
+                .collect()
         };
         (0..height).map(line).collect::<Vec<_>>().join("\n")
     }
@@ -311,7 +342,10 @@ mod tests {
         }
         let large = drawn(&view(State::Asking(Stage::Movement)), 100, 36);
         println!("{large}");
-        let dots = large.chars().filter(|c| ('\u{2801}'..='\u{28ff}').contains(c)).count();
+        let dots = large
+            .chars()
+            .filter(|c| ('\u{2801}'..='\u{28ff}').contains(c))
+            .count();
         assert!(dots > 60, "gripper and hand are drawn:\n{large}");
     }
 }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use host::chip::link::Flashed;
 use host::next::{NextStep, Warning};
 use host::training::judgement::Named;
+use host::training::judgement::pairs::PairJudged;
 use host::training::model::Int16;
 use host::training::quality::{Measured, Quality};
 
@@ -129,6 +130,31 @@ pub struct Evaluated<'a> {
     pub verdict: Option<String>,
     /// What is wrong with the map, the worst first.
     pub faults: Vec<Named>,
+}
+
+/// `report`.
+#[derive(Debug, Serialize)]
+pub struct Reported<'a> {
+    /// The page's file.
+    pub page: &'a Path,
+    /// The model's file.
+    pub model: &'a Path,
+    /// The file of the poses it is judged on.
+    pub poses: &'a Path,
+    /// How good the map is.
+    pub quality: Measures<'a>,
+    /// Whether it is worth driving with.
+    pub good: bool,
+    /// The verdict in a line.
+    pub verdict: String,
+    /// What is wrong with the map, the worst first.
+    pub faults: Vec<Named>,
+    /// Which finger moves what, in words: a sentence an axis.
+    pub influence: Vec<String>,
+    /// The corner of the gripper's space that is reached least, in words.
+    pub least_reached: String,
+    /// The reference pairs one by one; `null` where they are not known.
+    pub pairs: Option<&'a [PairJudged]>,
 }
 
 /// `export`.

@@ -117,7 +117,9 @@ impl Gloved {
         while scans < 50 {
             scans += u32::from(gloved.scan().is_some_and(|s| s.frame.good() == u16::MAX));
             if gloved.now() > end {
-                return Err(Failure::new("the virtual glove does not answer", "another --seed").into());
+                return Err(
+                    Failure::new("the virtual glove does not answer", "another --seed").into(),
+                );
             }
         }
         let wait = Duration::from_ticks(30_000_000);
@@ -254,7 +256,8 @@ impl Lived {
                     }
                     News::Learn(wanted) => {
                         let began = Here::now();
-                        let lesson = lessons.next(&wanted.start, &wanted.taught, &wanted.passed_over)?;
+                        let lesson =
+                            lessons.next(&wanted.start, &wanted.taught, &wanted.passed_over)?;
                         slowest = slowest.max(began.elapsed());
                         teaching.learned(wanted.number, lesson.target, body.now());
                     }

@@ -100,7 +100,8 @@ impl Aim {
         match self {
             Self::Gripper(_) => gripper_words(target),
             Self::Samples { .. } => {
-                let values: Vec<String> = target.iter().map(|value| format!("{value:.2}")).collect();
+                let values: Vec<String> =
+                    target.iter().map(|value| format!("{value:.2}")).collect();
                 values.join(", ")
             }
         }

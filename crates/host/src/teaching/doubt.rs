@@ -108,21 +108,28 @@ mod tests {
 
     #[test]
     fn the_same_pose_for_another_target_is_refused_and_for_a_like_one_it_is_not() {
-        let pairs = [taught(&[0.0, 0.0, 0.0, 130.0]), taught(&[255.0, 0.0, 0.0, 130.0])];
+        let pairs = [
+            taught(&[0.0, 0.0, 0.0, 130.0]),
+            taught(&[255.0, 0.0, 0.0, 130.0]),
+        ];
         let mut angles = pairs[1].angles;
         angles[3] += 0.08;
         let far = doubt(&angles, &[0.0, 255.0, 0.0, 130.0], &pairs, &AIM);
         assert_eq!(far, Some(Doubt::Alike { pair: 2 }));
-        assert_eq!(doubt(&angles, &[230.0, 20.0, 0.0, 150.0], &pairs, &AIM), None);
+        assert_eq!(
+            doubt(&angles, &[230.0, 20.0, 0.0, 150.0], &pairs, &AIM),
+            None
+        );
     }
 
     #[test]
     fn right_answers_of_a_person_to_far_targets_are_never_much_alike() {
         let targets = Space::ThreeFinger.samples(150, 3, Draw::Train);
         let pairs: Vec<Taught> = targets.iter_rows().map(taught).collect();
-        let refused = pairs.iter().enumerate().filter(|(k, pair)| {
-            doubt(&pair.angles, &pair.target, &pairs[..*k], &AIM).is_some()
-        });
+        let refused = pairs
+            .iter()
+            .enumerate()
+            .filter(|(k, pair)| doubt(&pair.angles, &pair.target, &pairs[..*k], &AIM).is_some());
         // Among 150 at random: adaptive ones are far from one another.
         assert!(refused.count() <= 3);
     }
@@ -133,6 +140,9 @@ mod tests {
         angles[8] = 2.6;
         let found = doubt(&angles, &[0.0; 4], &[], &AIM).unwrap();
         assert!(!found.may_insist());
-        assert!(found.to_string().starts_with("index_pip_flex is at 149°"), "{found}");
+        assert!(
+            found.to_string().starts_with("index_pip_flex is at 149°"),
+            "{found}"
+        );
     }
 }

@@ -93,7 +93,12 @@ impl Free {
         let prompt = self.prompts.get(self.place)?;
         let gone = Time::from_micros(since(now, self.began).as_ticks());
         let left = prompt.time.saturating_sub(gone);
-        let later: Time = self.prompts.iter().skip(self.place + 1).map(|p| p.time).sum();
+        let later: Time = self
+            .prompts
+            .iter()
+            .skip(self.place + 1)
+            .map(|p| p.time)
+            .sum();
         Some(FreeAsk {
             ask: prompt.ask,
             number: self.place + 1,
@@ -141,7 +146,11 @@ mod tests {
             while !free.is_over() {
                 now += Duration::from_ticks(28_000);
                 let t = now.as_ticks() as f64 * 1e-6;
-                let angles = if still { [0.0; JOINT_COUNT] } else { generator.pose_at(t) };
+                let angles = if still {
+                    [0.0; JOINT_COUNT]
+                } else {
+                    generator.pose_at(t)
+                };
                 free.take(&angles, now);
                 free.pass(now);
             }

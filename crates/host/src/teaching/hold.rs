@@ -58,11 +58,7 @@ impl Hold {
     }
 
     /// Takes a scan of the whole hand, radians. What was held, where it is held for long enough now.
-    pub fn take(
-        &mut self,
-        at: Instant,
-        angles: &[f32; JOINT_COUNT],
-    ) -> Option<[f32; JOINT_COUNT]> {
+    pub fn take(&mut self, at: Instant, angles: &[f32; JOINT_COUNT]) -> Option<[f32; JOINT_COUNT]> {
         self.pass(at);
         self.recent.push_back((at, *angles));
         while self

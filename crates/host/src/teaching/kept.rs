@@ -55,7 +55,12 @@ impl Kept {
         if pairs.is_empty() {
             return match std::fs::remove_file(&self.pairs) {
                 Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error).or_fail(
-                    || format!("the pairs file {} cannot be taken away", self.pairs.display()),
+                    || {
+                        format!(
+                            "the pairs file {} cannot be taken away",
+                            self.pairs.display()
+                        )
+                    },
                     "a folder that you may write in",
                 ),
                 _ => Ok(()),
@@ -98,7 +103,11 @@ pub fn load_pairs(path: &Path, aim: &Aim) -> Result<Vec<Taught>> {
         })
         .collect();
     let starts = aim.start();
-    if let Some(place) = taught.iter().zip(&starts).position(|(pair, start)| pair.target != *start) {
+    if let Some(place) = taught
+        .iter()
+        .zip(&starts)
+        .position(|(pair, start)| pair.target != *start)
+    {
         let what = format!(
             "{}: pair {} is for {:?}, and a session's is for {:?}",
             path.display(),
@@ -106,7 +115,11 @@ pub fn load_pairs(path: &Path, aim: &Aim) -> Result<Vec<Taught>> {
             taught[place].target,
             starts[place]
         );
-        return Err(Failure::new(what, "the pairs file that train --live kept beside its model").into());
+        return Err(Failure::new(
+            what,
+            "the pairs file that train --live kept beside its model",
+        )
+        .into());
     }
     Ok(taught)
 }
@@ -119,7 +132,11 @@ mod tests {
     const AIM: Aim = Aim::Gripper(Space::ThreeFinger);
 
     fn pairs() -> Vec<Taught> {
-        let targets = [[0.0, 0.0, 0.0, 130.0], [255.0, 255.0, 255.0, 130.0], [3.25, 9.0, 1.0, 2.0]];
+        let targets = [
+            [0.0, 0.0, 0.0, 130.0],
+            [255.0, 255.0, 255.0, 130.0],
+            [3.25, 9.0, 1.0, 2.0],
+        ];
         let taught = |(k, target): (usize, [f32; 4])| Taught {
             target: target.to_vec(),
             angles: std::array::from_fn(|joint| 0.1 * joint as f32 / 3.0 + 0.01 * k as f32),

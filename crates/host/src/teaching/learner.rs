@@ -60,7 +60,10 @@ impl Learner {
         let thread = std::thread::Builder::new()
             .name("learner".to_owned())
             .spawn(move || work(lessons, &asked, &answer))
-            .or_fail(|| "nothing can be learned".to_owned(), "ending other programs")?;
+            .or_fail(
+                || "nothing can be learned".to_owned(),
+                "ending other programs",
+            )?;
         Ok(Self {
             questions: Some(questions),
             answers,
@@ -95,7 +98,9 @@ impl Learner {
     pub fn end(mut self) -> Result<Lessons> {
         self.questions = None;
         let thread = self.thread.take();
-        thread.and_then(|thread| thread.join().ok()).ok_or_else(fault)
+        thread
+            .and_then(|thread| thread.join().ok())
+            .ok_or_else(fault)
     }
 }
 

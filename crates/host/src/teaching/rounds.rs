@@ -6,9 +6,9 @@ use glove::Instant;
 use glove::hand::JOINT_COUNT;
 use trainer::data::{Matrix, Pairs};
 
+use super::aim::{Aim, Taught};
 use super::doubt::{Doubt, doubt};
 use super::hold::{Hold, Stage};
-use super::aim::{Aim, Taught};
 use super::learner::Wanted;
 use crate::clock::since;
 use crate::training::lessons::MOST_PAIRS;
@@ -106,7 +106,9 @@ impl Teaching {
     pub fn new(aim: Aim, rounds: usize, kept: Vec<Taught>, now: Instant) -> Self {
         let start = aim.start();
         let mut teaching = Self {
-            rounds: rounds.clamp(1, MOST_PAIRS).max(kept.len().saturating_sub(start.len())),
+            rounds: rounds
+                .clamp(1, MOST_PAIRS)
+                .max(kept.len().saturating_sub(start.len())),
             aim,
             start,
             pairs: kept,
@@ -263,7 +265,8 @@ impl Teaching {
     }
 
     fn ask_for(&mut self, target: Vec<f32>, now: Instant) {
-        self.hold.ask(now, self.pairs.last().map(|pair| pair.angles));
+        self.hold
+            .ask(now, self.pairs.last().map(|pair| pair.angles));
         self.target = Some(target.clone());
         self.tell(News::Asked(target));
     }

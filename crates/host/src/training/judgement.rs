@@ -54,7 +54,10 @@ pub enum Fault {
 impl Fault {
     /// Whether the map may be driven with all the same.
     pub fn is_doubt(&self) -> bool {
-        matches!(self, Self::Pairs(_) | Self::LittleMotion(_) | Self::Short { .. })
+        matches!(
+            self,
+            Self::Pairs(_) | Self::LittleMotion(_) | Self::Short { .. }
+        )
     }
 
     /// A word for programs.
@@ -96,7 +99,10 @@ impl Fault {
                 format!("{} never {verb}: {at:.0} of {end}", axis_of(axis))
             }
             Self::LittleMotion(missing) => {
-                format!("too little motion was recorded: it lacks {}", names(missing))
+                format!(
+                    "too little motion was recorded: it lacks {}",
+                    names(missing)
+                )
             }
             Self::Pairs(suspect) => suspect.to_string(),
         }
@@ -109,7 +115,9 @@ impl Fault {
                 "train again with another --seed or one more pair; look at the pairs"
             }
             Self::Short { .. } => "show that gripper pose as a pair, with a hand pose of your own",
-            Self::LittleMotion(_) => "record the hand once more: every finger alone and together, over its whole range",
+            Self::LittleMotion(_) => {
+                "record the hand once more: every finger alone and together, over its whole range"
+            }
             Self::Pairs(_) => "take that pair back, or show it again",
         }
     }
@@ -194,14 +202,22 @@ impl fmt::Display for Judgement {
     /// The verdict in one line, with its thresholds.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let named = |fault: &Fault| fault.words(self.space.axes());
-        let of = |doubt: bool| self.faults.iter().filter(move |fault| fault.is_doubt() == doubt);
+        let of = |doubt: bool| {
+            self.faults
+                .iter()
+                .filter(move |fault| fault.is_doubt() == doubt)
+        };
         let faults: Vec<String> = of(false)
             .filter(|fault| !matches!(fault, Fault::Measures(_)))
             .map(named)
             .collect();
         let doubts: Vec<String> = of(true).map(named).collect();
         let bar = &self.quality.bar;
-        let word = if self.good() { "good enough to drive with" } else { "not good enough to drive with" };
+        let word = if self.good() {
+            "good enough to drive with"
+        } else {
+            "not good enough to drive with"
+        };
         write!(
             f,
             "{word}: volume occupancy {:.3} (at least {})",
@@ -214,7 +230,11 @@ impl fmt::Display for Judgement {
             write!(f, "; {fault}")?;
         }
         for (place, doubt) in doubts.iter().enumerate() {
-            let but = if place == 0 && faults.is_empty() && self.good() { ", but " } else { "; " };
+            let but = if place == 0 && faults.is_empty() && self.good() {
+                ", but "
+            } else {
+                "; "
+            };
             write!(f, "{but}{doubt}")?;
         }
         Ok(())
@@ -225,8 +245,16 @@ impl fmt::Display for Judgement {
 fn short(reach: &Reach, space: Space) -> Vec<Fault> {
     let ends = (0..space.axes()).flat_map(|axis| {
         let (low, high) = reach.ranges[axis];
-        let lacks_low = (low > SHORT_OF).then_some(Fault::Short { axis, high: false, at: low });
-        let lacks_high = (high < 255.0 - SHORT_OF).then_some(Fault::Short { axis, high: true, at: high });
+        let lacks_low = (low > SHORT_OF).then_some(Fault::Short {
+            axis,
+            high: false,
+            at: low,
+        });
+        let lacks_high = (high < 255.0 - SHORT_OF).then_some(Fault::Short {
+            axis,
+            high: true,
+            at: high,
+        });
         [lacks_low, lacks_high]
     });
     ends.flatten().collect()

@@ -115,7 +115,7 @@ pub(super) fn warnings(task: &Task, course: &Course) -> Result<Vec<Warning>> {
     Ok(said.warnings)
 }
 
-pub(super) fn trainer(task: &Task, course: &Course) -> Result<Trainer> {
+fn trainer(task: &Task, course: &Course) -> Result<Trainer> {
     let (q, x) = (
         task.units.q.apply_all(&task.training),
         task.units.x.apply_all(&task.targets),

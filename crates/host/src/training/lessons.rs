@@ -13,7 +13,7 @@ use trainer::measures::Coverage;
 use trainer::model::{Model, Normalisation};
 
 use super::hand::{HandPairs, task};
-use super::learn::{learn, trainer};
+use super::learn::learn;
 use super::motion::Motion;
 use super::quality::Measured;
 use super::task::{Course, Ended, Learned, TRAINING_SHARE, Task, Units};
@@ -60,7 +60,12 @@ impl Lessons {
     ///
     /// # Errors
     /// A failure that says what is wrong with the data.
-    pub fn of_gripper(motion: &Motion, space: Space, course: Course, reporter: &dyn Reporter) -> Result<Self> {
+    pub fn of_gripper(
+        motion: &Motion,
+        space: Space,
+        course: Course,
+        reporter: &dyn Reporter,
+    ) -> Result<Self> {
         let wanted = HandPairs {
             choice: None,
             file: None,
@@ -76,11 +81,18 @@ impl Lessons {
     ///
     /// # Errors
     /// A failure that says what is wrong with the data.
-    pub fn of_samples(motion: &Motion, targets: &Matrix, course: Course, reporter: &dyn Reporter) -> Result<Self> {
+    pub fn of_samples(
+        motion: &Motion,
+        targets: &Matrix,
+        course: Course,
+        reporter: &dyn Reporter,
+    ) -> Result<Self> {
         let mut lessons = Self::of_gripper(motion, Space::ThreeFinger, course, reporter)?;
         let task = &mut lessons.task;
         let ranges = targets.ranges();
-        let widest = ranges.iter().fold(0.0_f32, |most, (low, high)| most.max(high - low));
+        let widest = ranges
+            .iter()
+            .fold(0.0_f32, |most, (low, high)| most.max(high - low));
         if widest <= 0.0 {
             let what = format!("all {} target samples are one point", targets.rows);
             return Err(Failure::new(what, "samples of a domain that has some extent").into());
@@ -88,7 +100,10 @@ impl Lessons {
         task.units = Units {
             q: Normalisation::identity(JOINT_NAMES.len()),
             x: Normalisation {
-                offset: ranges.iter().map(|(low, high)| 0.5 * (low + high)).collect(),
+                offset: ranges
+                    .iter()
+                    .map(|(low, high)| 0.5 * (low + high))
+                    .collect(),
                 scale: vec![0.5 * widest / 0.7; targets.cols],
             },
         };
@@ -117,13 +132,21 @@ impl Lessons {
     /// # Errors
     /// A failure that says what is wrong with the data or the pairs.
     pub fn next(&mut self, start: &Pairs, taught: &Pairs, passed_over: &Matrix) -> Result<Lesson> {
-        let same = if *start == self.start { alike(&self.taught, taught) } else { 0 };
+        let same = if *start == self.start {
+            alike(&self.taught, taught)
+        } else {
+            0
+        };
         if *start != self.start || self.trainer.is_none() || self.states.get(same).is_none() {
             self.task.pairs = PairPlan::Adaptive {
                 start: start.clone(),
                 count: MOST_PAIRS,
             };
-            self.trainer = Some(trainer(&self.task, &self.course)?);
+            let task = &self.task;
+            let q = task.units.q.apply_all(&task.training);
+            let x = task.units.x.apply_all(&task.targets);
+            let settings = self.course.settings(task);
+            self.trainer = Some(Trainer::new(&q, &x, &settings).map_err(told)?);
             self.states.clear();
             self.start = start.clone();
         }
@@ -165,7 +188,12 @@ impl Lessons {
     ///
     /// # Errors
     /// A failure that says what is wrong, or that the end was asked for.
-    pub fn finish(&mut self, pairs: Pairs, reporter: &dyn Reporter, interrupt: &Interrupt) -> Result<Finished> {
+    pub fn finish(
+        &mut self,
+        pairs: Pairs,
+        reporter: &dyn Reporter,
+        interrupt: &Interrupt,
+    ) -> Result<Finished> {
         self.task.pairs = PairPlan::Fixed(pairs);
         let learned = match learn(&mut self.task, &self.course, reporter, interrupt)? {
             Ended::Trained(learned) => *learned,
@@ -257,13 +285,20 @@ mod tests {
         };
         let again = one.next(&start, &first, &none).unwrap().target.unwrap();
         assert_eq!(again, targets[1]);
-        assert_eq!(one.next(&start, &taught, &none).unwrap().target.unwrap(), fourth);
+        assert_eq!(
+            one.next(&start, &taught, &none).unwrap().target.unwrap(),
+            fourth
+        );
         // Another program, with all pairs at once.
         let other = lessons().next(&start, &taught, &none).unwrap();
         assert_eq!(other.target.unwrap(), fourth);
         let mut passed_over = Matrix::default();
         passed_over.push(&fourth);
-        let instead = one.next(&start, &taught, &passed_over).unwrap().target.unwrap();
+        let instead = one
+            .next(&start, &taught, &passed_over)
+            .unwrap()
+            .target
+            .unwrap();
         assert_ne!(instead, fourth);
     }
 }

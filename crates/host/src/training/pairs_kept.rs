@@ -15,7 +15,9 @@ pub fn keep(pairs: &Pairs, metadata: &mut Metadata) {
     }
     let words = |row: &[f32]| row.iter().map(f32::to_string).collect::<Vec<_>>().join(" ");
     let rows = pairs.inputs.iter_rows().zip(pairs.targets.iter_rows());
-    let text: Vec<String> = rows.map(|(q, x)| format!("{}|{}", words(q), words(x))).collect();
+    let text: Vec<String> = rows
+        .map(|(q, x)| format!("{}|{}", words(q), words(x)))
+        .collect();
     metadata.insert(KEY.to_owned(), text.join(";"));
 }
 
@@ -24,7 +26,8 @@ pub fn reference_pairs(model: &Model) -> Option<Pairs> {
     let mut pairs = Pairs::default();
     let numbers = |text: &str, count: usize| -> Option<Vec<f32>> {
         let values: Result<Vec<f32>, _> = text.split(' ').map(str::parse).collect();
-        let is_usable = |values: &Vec<f32>| values.len() == count && values.iter().all(|v| v.is_finite());
+        let is_usable =
+            |values: &Vec<f32>| values.len() == count && values.iter().all(|v| v.is_finite());
         values.ok().filter(is_usable)
     };
     let [inputs, _, outputs] = model.shape();

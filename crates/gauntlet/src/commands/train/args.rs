@@ -143,7 +143,12 @@ pub struct Worn {
     #[arg(long, value_name = "PORT", requires = "live", conflicts_with_all = ["glove", "profile", "ideal"])]
     pub bridge: Option<Address>,
     /// The glove's profile, if not the one that is found by its sensors' ids.
-    #[arg(long, value_name = "FILE.toml", requires = "live", conflicts_with = "ideal")]
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        requires = "live",
+        conflicts_with = "ideal"
+    )]
     pub profile: Option<PathBuf>,
     /// Take the sensors as ideal: sewn on straight, with one heading. Virtual gloves only.
     #[arg(long, requires = "live")]

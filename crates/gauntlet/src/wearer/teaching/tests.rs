@@ -45,7 +45,10 @@ fn a_whole_live_training_of_eight_rounds_ends_with_a_usable_map() {
         .finish(&mut lessons, &motion, &came.pairs, &never)
         .unwrap();
     let (most, median) = judgement.pairs.as_ref().unwrap().off();
-    println!("{judgement}; off the pairs by {most:.1}, {median:.1}; person {:.0} s", came.person_s);
+    println!(
+        "{judgement}; off the pairs by {most:.1}, {median:.1}; person {:.0} s",
+        came.person_s
+    );
     println!("{:#?}", judgement.influence.words());
     assert!(judgement.good(), "{judgement}");
     assert!(most <= 25.0 && median <= 8.0, "{most} {median}");
@@ -92,7 +95,9 @@ fn killed_at_moments(count: u64, seed: u64) {
         if left.len() > 2 && left.len() < 10 {
             let pairs = |to: usize| matrices(&came.pairs[2..to]);
             let start = matrices(&came.pairs[..2]);
-            let next = whole.next(&start, &pairs(left.len()), &Default::default()).unwrap();
+            let next = whole
+                .next(&start, &pairs(left.len()), &Default::default())
+                .unwrap();
             assert_eq!(next.target.unwrap(), came.pairs[left.len()].target);
         }
     }
@@ -155,7 +160,9 @@ fn ten_persons_in_honest_gloves_teach_usable_maps() {
     for values in [&mut occupancy, &mut most, &mut median, &mut machine] {
         values.sort_by(f64::total_cmp);
     }
-    println!("occupancy {occupancy:.3?}\nmost {most:.1?}\nmedian {median:.1?}\nmachine {machine:.1?} s");
+    println!(
+        "occupancy {occupancy:.3?}\nmost {most:.1?}\nmedian {median:.1?}\nmachine {machine:.1?} s"
+    );
     assert!(occupancy[5] >= 0.93, "{occupancy:?}");
     assert!(most[9] <= 25.0 && median[5] <= 8.0, "{most:?} {median:?}");
 }
@@ -174,7 +181,10 @@ fn a_nonsense_pair_of_eight_is_pointed_out() {
             .poses(&mut body, &mut lessons, &bench.kept, &mut never)
             .unwrap();
         let said = host::training::judgement::pairs::suspect(&matrices(&came.pairs));
-        println!("seed {seed}: nonsense in {:?}, said {said:?}, refused {}", lived.nonsense, came.refused);
+        println!(
+            "seed {seed}: nonsense in {:?}, said {said:?}, refused {}",
+            lived.nonsense, came.refused
+        );
         let odd = host::training::judgement::pairs::Suspect::Odd(lived.nonsense.unwrap());
         found += u32::from(said == Some(odd));
     }

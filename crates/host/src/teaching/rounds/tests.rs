@@ -80,7 +80,12 @@ fn whole() -> Bench {
 #[test]
 fn open_hand_and_fist_come_first_then_each_round_s_target_then_the_map_can_be_tried() {
     let bench = whole();
-    let taken: Vec<_> = bench.teaching.pairs().iter().map(|pair| pair.target.clone()).collect();
+    let taken: Vec<_> = bench
+        .teaching
+        .pairs()
+        .iter()
+        .map(|pair| pair.target.clone())
+        .collect();
     assert_eq!(taken[0], Space::ThreeFinger.start()[0]);
     assert_eq!(taken[1], Space::ThreeFinger.start()[1]);
     assert_eq!(taken[2..], TARGETS[..2]);
@@ -106,7 +111,13 @@ fn a_pose_much_like_an_earlier_one_is_refused_with_a_word_and_taken_where_the_pe
     bench.hold(shown(fist), 3.5);
     // The open hand once more, for another target.
     bench.hold(shown(open), 3.5);
-    assert!(bench.told.contains(&News::Refused(Doubt::Alike { pair: 1 })), "{:?}", bench.told);
+    assert!(
+        bench
+            .told
+            .contains(&News::Refused(Doubt::Alike { pair: 1 })),
+        "{:?}",
+        bench.told
+    );
     assert_eq!(bench.teaching.pairs().len(), 2);
     bench.act(Act::Capture);
     assert_eq!(bench.teaching.pairs().len(), 3);
@@ -187,8 +198,12 @@ fn a_late_answer_of_the_learner_to_an_older_question_is_passed_over() {
     let Some(News::Learn(wanted)) = bench.teaching.news.pop_back() else {
         panic!("asked");
     };
-    bench.teaching.learned(wanted.number - 1, Some(vec![9.0; 4]), bench.now);
+    bench
+        .teaching
+        .learned(wanted.number - 1, Some(vec![9.0; 4]), bench.now);
     assert_eq!(bench.state(), State::Choosing);
-    bench.teaching.learned(wanted.number, Some(vec![7.0; 4]), bench.now);
+    bench
+        .teaching
+        .learned(wanted.number, Some(vec![7.0; 4]), bench.now);
     assert_eq!(bench.target(), vec![7.0; 4]);
 }

@@ -95,7 +95,8 @@ impl Influence {
                     of.mean[axis][cause] += share * change;
                     of.ways[axis][cause][0] += share * f32::from(u8::from(change > STRONG));
                     of.ways[axis][cause][1] += share * f32::from(u8::from(change < -STRONG));
-                    let there_and_back = (b - a) * (c - b) < 0.0 && (b - a).abs().min((c - b).abs()) > STRONG;
+                    let there_and_back =
+                        (b - a) * (c - b) < 0.0 && (b - a).abs().min((c - b).abs()) > STRONG;
                     of.back[axis][cause] += share * f32::from(u8::from(there_and_back));
                 }
             }
@@ -111,11 +112,17 @@ impl Influence {
         };
         let mut turned = Vec::new();
         for axis in 0..self.mean.len() {
-            let both: Vec<f32> = self.ways[axis].iter().map(|[up, down]| up.min(*down)).collect();
-            if let Some(cause) = worst(&self.back[axis]).filter(|c| self.back[axis][*c] > SHARE) {
-                turned.push(Turned::Fold { axis, cause });
-            } else if let Some(cause) = worst(&both).filter(|c| both[*c] > SHARE) {
+            let both: Vec<f32> = self.ways[axis]
+                .iter()
+                .map(|[up, down]| up.min(*down))
+                .collect();
+            // What twists also folds along another finger: the twist says more.
+            if let Some(cause) = worst(&both).filter(|c| both[*c] > SHARE) {
                 turned.push(Turned::Twist { axis, cause });
+            } else if let Some(cause) =
+                worst(&self.back[axis]).filter(|c| self.back[axis][*c] > SHARE)
+            {
+                turned.push(Turned::Fold { axis, cause });
             }
         }
         turned
@@ -126,7 +133,9 @@ impl Influence {
         let axes = self.mean.len();
         let sentence = |(axis, row): (usize, &[f32; CAUSES.len()])| {
             let name = axis_words(axes).get(axis).copied().unwrap_or("the axis");
-            let most = row.iter().fold(0.0_f32, |most, change| most.max(change.abs()));
+            let most = row
+                .iter()
+                .fold(0.0_f32, |most, change| most.max(change.abs()));
             if most < NOTHING {
                 return format!("nothing moves {name}");
             }
@@ -146,8 +155,16 @@ impl Influence {
                         (_, false, true) => "open",
                         (_, true, false) => "closes",
                     };
-                    let whose = if cause == CAUSES.len() - 1 { "" } else { "your " };
-                    format!("{whose}{} {verb} it by {:.0}", CAUSES[cause], row[cause].abs())
+                    let whose = if cause == CAUSES.len() - 1 {
+                        ""
+                    } else {
+                        "your "
+                    };
+                    format!(
+                        "{whose}{} {verb} it by {:.0}",
+                        CAUSES[cause],
+                        row[cause].abs()
+                    )
                 })
                 .collect();
             format!("{name}: {}", parts.join(", "))
@@ -160,14 +177,20 @@ impl Influence {
 fn joints() -> [Vec<(usize, bool)>; CAUSES.len()] {
     let bends = |joints: [usize; 3]| joints.map(|joint| (joint, true)).to_vec();
     let [index, middle, ring, little] = Finger::ALL.map(Finger::flexions);
-    let apart = [(Finger::Index, true), (Finger::Ring, false), (Finger::Little, false)];
+    let apart = [
+        (Finger::Index, true),
+        (Finger::Ring, false),
+        (Finger::Little, false),
+    ];
     [
         bends(THUMB_FLEXIONS),
         bends(index),
         bends(middle),
         bends(ring),
         bends(little),
-        apart.map(|(finger, opens)| (finger.mcp_abd(), opens)).to_vec(),
+        apart
+            .map(|(finger, opens)| (finger.mcp_abd(), opens))
+            .to_vec(),
     ]
 }
 

@@ -73,7 +73,9 @@ impl PairsJudged {
             let (target, mapped) = (pairs.targets.row(k), model.map(pairs.inputs.row(k)));
             // Beyond its ends a gripper stays: a map that goes there is not off.
             let off = target.iter().zip(&mapped);
-            let off = off.fold(0.0_f32, |most, (a, b)| most.max((a - b.clamp(0.0, 255.0)).abs()));
+            let off = off.fold(0.0_f32, |most, (a, b)| {
+                most.max((a - b.clamp(0.0, 255.0)).abs())
+            });
             PairJudged {
                 target: target.to_vec(),
                 mapped,
@@ -119,7 +121,10 @@ pub fn suspect(pairs: &Pairs) -> Option<Suspect> {
             let mut order: Vec<usize> = (0..count).collect();
             order.swap(a, b);
             let targets = pairs.targets.select(&order);
-            offer(root_mean_square(&residuals(&c, &targets)), Suspect::Swapped(a + 1, b + 1));
+            offer(
+                root_mean_square(&residuals(&c, &targets)),
+                Suspect::Swapped(a + 1, b + 1),
+            );
         }
     }
     for out in 0..count {
@@ -139,15 +144,24 @@ fn root_mean_square(values: &[f64]) -> f64 {
 fn gram(inputs: &Matrix) -> Vec<Vec<f64>> {
     let count = inputs.rows.max(1) as f64;
     let mean: Vec<f64> = (0..inputs.cols)
-        .map(|joint| inputs.iter_rows().map(|row| f64::from(row[joint])).sum::<f64>() / count)
+        .map(|joint| {
+            inputs
+                .iter_rows()
+                .map(|row| f64::from(row[joint]))
+                .sum::<f64>()
+                / count
+        })
         .collect();
     let product = |a: &[f32], b: &[f32]| -> f64 {
         let joints = a.iter().zip(b).zip(&mean);
-        joints.map(|((a, b), m)| (f64::from(*a) - m) * (f64::from(*b) - m)).sum()
+        joints
+            .map(|((a, b), m)| (f64::from(*a) - m) * (f64::from(*b) - m))
+            .sum()
     };
     let entry = |(i, a): (usize, &[f32])| {
         let row = inputs.iter_rows().enumerate();
-        row.map(|(j, b)| product(a, b) + CONSTANT + if i == j { RIDGE } else { 0.0 }).collect()
+        row.map(|(j, b)| product(a, b) + CONSTANT + if i == j { RIDGE } else { 0.0 })
+            .collect()
     };
     inputs.iter_rows().enumerate().map(entry).collect()
 }
@@ -161,11 +175,17 @@ fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
         .collect();
     for i in 0..count {
         let scale = 1.0 / left[i][i];
-        left[i].iter_mut().chain(&mut right[i]).for_each(|value| *value *= scale);
+        left[i]
+            .iter_mut()
+            .chain(&mut right[i])
+            .for_each(|value| *value *= scale);
         let (pivot, unit) = (left[i].clone(), right[i].clone());
         for k in (0..count).filter(|k| *k != i) {
             let factor = left[k][i];
-            let rows = left[k].iter_mut().zip(&pivot).chain(right[k].iter_mut().zip(&unit));
+            let rows = left[k]
+                .iter_mut()
+                .zip(&pivot)
+                .chain(right[k].iter_mut().zip(&unit));
             rows.for_each(|(value, pivot)| *value -= factor * pivot);
         }
     }

@@ -61,12 +61,20 @@ impl Reach {
 fn corners(space: Space) -> Vec<Vec<f32>> {
     let axes = space.axes();
     let corner = |bits: usize| -> Vec<f32> {
-        (0..axes).map(|axis| if bits >> axis & 1 == 1 { 255.0 } else { 0.0 }).collect()
+        (0..axes)
+            .map(|axis| if bits >> axis & 1 == 1 { 255.0 } else { 0.0 })
+            .collect()
     };
-    (0..1 << axes).map(corner).filter(|counts| space.contains(counts)).collect()
+    (0..1 << axes)
+        .map(corner)
+        .filter(|counts| space.contains(counts))
+        .collect()
 }
 
 fn distance(a: &[f32], b: &[f32]) -> f32 {
-    let squares = a.iter().zip(b).map(|(a, b)| (a.clamp(0.0, 255.0) - b).powi(2));
+    let squares = a
+        .iter()
+        .zip(b)
+        .map(|(a, b)| (a.clamp(0.0, 255.0) - b).powi(2));
     squares.sum::<f32>().sqrt()
 }

@@ -11,9 +11,9 @@ use crate::commands::calibrate::source::{Place, Source};
 use crate::commands::train::args::Train;
 use crate::live::teach::{Doing, TeachView};
 use crate::live::{Key, Live};
+use crate::out;
 use crate::run::{ASK_FLAT, FLAT_WAIT};
 use crate::tell::Tell;
-use crate::out;
 use host::calibration::profile_of;
 use host::calibration::virtual_person::VirtualPerson;
 use host::clock::ticks;
@@ -127,7 +127,9 @@ impl<'a> Worn<'a> {
                 Flat::Taken => break,
                 Flat::Refused(why) => {
                     let what = format!("the flat hand was not taken: {why}");
-                    return Err(Failure::new(what, "the same again, the hand flat and still").into());
+                    return Err(
+                        Failure::new(what, "the same again, the hand flat and still").into(),
+                    );
                 }
                 Flat::Waiting(Some(why)) if said.elapsed() >= SAID_EVERY => {
                     said = Instant::now();
@@ -166,7 +168,9 @@ impl<'a> Worn<'a> {
             for key in live.keys().or_fail(terminal, next)? {
                 match key {
                     Key::End => {
-                        return Err(Failure::interrupted("in the free motion: nothing was kept").into());
+                        return Err(
+                            Failure::interrupted("in the free motion: nothing was kept").into()
+                        );
                     }
                     Key::Clutch | Key::Open => free.go_on(self.now()),
                     Key::Calibrate | Key::Again => {}
@@ -176,7 +180,10 @@ impl<'a> Worn<'a> {
                 break;
             };
             if !drawn && asked.replace(ask.number) != Some(ask.number) {
-                tell.say(format_args!("{:>2} of {}   {}", ask.number, ask.of, ask.ask));
+                tell.say(format_args!(
+                    "{:>2} of {}   {}",
+                    ask.number, ask.of, ask.ask
+                ));
             }
             let view = || TeachView {
                 elapsed: self.started.elapsed(),
@@ -225,7 +232,9 @@ fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand
     if let Source::Chip { scans, address } = source {
         let kept = scans.profile().map_err(|error| error.at(address))?;
         let bound = kept.ok_or_else(|| none("the bridge keeps no profile of it".to_owned()))?;
-        bound.fits(&ids).map_err(|misfit| none(misfit.to_string()))?;
+        bound
+            .fits(&ids)
+            .map_err(|misfit| none(misfit.to_string()))?;
         return Ok(Hand::with_profile(&bound));
     }
     let (_, kept) = profile_of(options.worn.profile.as_deref(), &ids)?.map_err(none)?;

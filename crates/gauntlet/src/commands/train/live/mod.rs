@@ -68,7 +68,12 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let mut warnings = finished.learned.warnings.clone();
     let judgement = aim.space().map(|space| {
         let quality = Quality::from_measured(&finished.measured, space);
-        Judgement::of((&finished.model, space), &motion.frames(), Some(&pairs), quality)
+        Judgement::of(
+            (&finished.model, space),
+            &motion.frames(),
+            Some(&pairs),
+            quality,
+        )
     });
     if let Some(judgement) = &judgement {
         warnings.extend(judgement.quality.unfit());
@@ -100,7 +105,10 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     if options.json {
         return results::print("train --live", taught);
     }
-    tell.say(format_args!("trained    in {}", seconds(finished.learned.took)));
+    tell.say(format_args!(
+        "trained    in {}",
+        seconds(finished.learned.took)
+    ));
     match &judgement {
         Some(judgement) => said::verdict(judgement, &tell),
         None => {
@@ -112,7 +120,10 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     tell.say(format_args!("pairs      {}", files.pairs().display()));
     tell.say(format_args!("model      {}", options.out.display()));
     let report = Command::gauntlet("report").path("--model", &options.out);
-    tell.say(format_args!("next       {}", report.then(" draws what it does")));
+    tell.say(format_args!(
+        "next       {}",
+        report.then(" draws what it does")
+    ));
     Ok(())
 }
 

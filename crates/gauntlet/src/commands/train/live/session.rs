@@ -210,9 +210,14 @@ impl<'a> Session<'a> {
         let axes = aim.axis_words().into_iter().zip(values).zip(aim.ranges());
         TeachView {
             elapsed: self.worn.started.elapsed(),
-            words: ask.target.as_ref().map_or_else(String::new, |target| aim.words(target)),
+            words: ask
+                .target
+                .as_ref()
+                .map_or_else(String::new, |target| aim.words(target)),
             gripper: shown.filter(|_| aim.space().is_some()),
-            axes: axes.map(|((name, value), range)| (name, value, range)).collect(),
+            axes: axes
+                .map(|((name, value), range)| (name, value, range))
+                .collect(),
             hand: self.worn.angles,
             said: self.said.clone(),
             glove: self.worn.line(),
