@@ -318,6 +318,24 @@ mod tests {
     }
 
     #[test]
+    fn asked_for_a_posture_it_goes_there_and_from_there_to_its_motion_without_a_jump() {
+        let mut hand = FlatFirst::new(Box::new(|_: f64| row(1.0)));
+        hand.pose_at(0.0);
+        assert_eq!(hand.pose_at(10.0), row(1.0));
+        hand.ask(Task::Posture([0.3; 25]));
+        hand.pose_at(10.0);
+        assert_eq!(hand.pose_at(11.5), row(0.3));
+        hand.ask(Task::Use(crate::person::Attitude::PalmDown));
+        let mut before = hand.pose_at(20.0)[0];
+        for step in 1..=3_000 {
+            let angle = hand.pose_at(20.0 + f64::from(step) * 1e-3)[0];
+            assert!((angle - before).abs() < 0.002, "{step}");
+            before = angle;
+        }
+        assert_eq!(before, 1.0);
+    }
+
+    #[test]
     fn a_recording_is_interpolated_between_its_rows_and_starts_again() {
         let mut r =
             Recorded::new(vec![10.0, 11.0, 12.0], vec![row(0.0), row(1.0), row(0.5)]).unwrap();

@@ -85,10 +85,7 @@ impl TeachView {
     /// How much of the hold, or of the movement, is over.
     fn share(&self) -> f64 {
         match &self.doing {
-            Doing::Free(ask) => {
-                let left = ask.left.as_secs_f64();
-                1.0 - (left / (left + 1.0)).clamp(0.0, 1.0)
-            }
+            Doing::Free(ask) => 1.0 - ask.left.as_secs_f64() / ask.time.as_secs_f64().max(0.001),
             Doing::Poses(Ask {
                 state: State::Asking(Stage::Holding(share)),
                 ..

@@ -23,6 +23,8 @@ pub struct FreeAsk {
     pub number: usize,
     /// Of how many.
     pub of: usize,
+    /// How long.
+    pub time: Time,
     /// What is left of it.
     pub left: Time,
     /// What is left of all.
@@ -103,6 +105,7 @@ impl Free {
             ask: prompt.ask,
             number: self.place + 1,
             of: self.prompts.len(),
+            time: prompt.time,
             left,
             all_left: left + later,
         })

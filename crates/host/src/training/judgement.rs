@@ -17,7 +17,7 @@ use trainer::hand::Space;
 use trainer::model::Model;
 
 use super::movements::{Movement, Movements};
-use super::quality::Quality;
+use super::quality::{LEAST_MEASURED, Quality};
 use super::recorded::names;
 use crate::words::axis_words;
 use influence::{Influence, Turned};
@@ -225,6 +225,13 @@ impl fmt::Display for Judgement {
         )?;
         if let Some(most) = bar.d_knn {
             write!(f, ", d-Knn {:.1} (at most {most})", self.quality.d_knn)?;
+        }
+        if self.quality.frames < LEAST_MEASURED {
+            let frames = self.quality.frames;
+            write!(
+                f,
+                "; {frames} poses are few to measure on: a verdict takes {LEAST_MEASURED}"
+            )?;
         }
         for fault in &faults {
             write!(f, "; {fault}")?;

@@ -140,7 +140,8 @@ impl Lessons {
         if *start != self.start || self.trainer.is_none() || self.states.get(same).is_none() {
             self.task.pairs = PairPlan::Adaptive {
                 start: start.clone(),
-                count: MOST_PAIRS,
+                // One is always due: the last stage is not the lessons' business.
+                count: MOST_PAIRS + 1,
             };
             let task = &self.task;
             let q = task.units.q.apply_all(&task.training);

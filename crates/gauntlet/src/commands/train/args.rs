@@ -156,6 +156,14 @@ pub struct Worn {
     /// Which hand wears the glove, where no profile says.
     #[arg(long, value_enum, default_value_t = WhichHand::Right)]
     pub hand: WhichHand,
+    /// Show each pose on the gripper at this port, too: the fingers move, slowly. It must be activated. Without it nothing moves.
+    #[arg(
+        long,
+        value_name = "PORT",
+        requires = "live",
+        conflicts_with = "target"
+    )]
+    pub show_on: Option<PathBuf>,
 }
 
 /// What the volume occupancy of a domain from a file needs.

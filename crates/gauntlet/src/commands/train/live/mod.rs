@@ -4,6 +4,7 @@ mod files;
 mod hand;
 mod said;
 mod session;
+mod shower;
 
 use std::time::Instant;
 
@@ -26,11 +27,12 @@ use host::next::{Command, advice};
 use host::stats::seconds;
 use host::teaching::kept::matrices;
 use host::teaching::{Aim, Learner};
-use host::training::PairKind;
 use host::training::judgement::Judgement;
 use host::training::lessons::Lessons;
 use host::training::quality::Quality;
+use host::training::{Course, PairKind};
 use session::{Session, Shown};
+use shower::Shower;
 
 /// Pairs besides the start poses where nothing else is said (§3.3.4).
 const ROUNDS: usize = 8;
@@ -48,14 +50,21 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let mut worn = hand::Worn::open(&place, options, &tell, interrupt)?;
     let begun = Instant::now();
     let motion = files.motion(&mut worn, options, &tell, interrupt)?;
-    let course = request::course(options);
+    // --resume names pairs here, no checkpoint.
+    let course = Course {
+        checkpoint: None,
+        resume: None,
+        ..request::course(options)
+    };
     let mut lessons = match &aim {
         Aim::Gripper(space) => Lessons::of_gripper(&motion, *space, course, &Person)?,
         Aim::Samples { samples, .. } => Lessons::of_samples(&motion, samples, course, &Person)?,
     };
     // What begins to be learned is ready before the first pose is asked.
     let learner = Learner::start(lessons)?;
-    let mut session = Session::new(worn, learner, &aim, rounds, &files, options.json);
+    let shower = (options.worn.show_on.as_deref())
+        .map(|gripper| Shower::new(gripper, options.gripper_model));
+    let mut session = Session::new(worn, learner, &aim, rounds, &files, options.json).on(shower);
     let led = session.lead(&tell, interrupt);
     let done = session.finish()?;
     if led.map_err(|error| files.goes_on(error, &done.pairs))? == Shown::Stopped {

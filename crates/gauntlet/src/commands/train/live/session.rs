@@ -8,6 +8,7 @@ use trainer::model::Model;
 
 use super::files::Files;
 use super::hand::Worn;
+use super::shower::Shower;
 use crate::live::teach::{Doing, TeachView};
 use crate::live::{Key, Live};
 use crate::out;
@@ -55,6 +56,8 @@ pub(super) struct Session<'a> {
     taken_back: usize,
     taken: Option<Instant>,
     slowest: Duration,
+    /// The gripper that shows the poses, where one does.
+    shower: Option<Shower>,
 }
 
 impl<'a> Session<'a> {
@@ -78,7 +81,13 @@ impl<'a> Session<'a> {
             taken_back: 0,
             taken: None,
             slowest: Duration::ZERO,
+            shower: None,
         }
+    }
+
+    /// The same with a gripper that shows the poses.
+    pub fn on(self, shower: Option<Shower>) -> Self {
+        Self { shower, ..self }
     }
 
     /// Leads the person through it.
@@ -106,6 +115,8 @@ impl<'a> Session<'a> {
                     b'u' | 0x7f => Act::Undo,
                     b's' => Act::Skip,
                     b'+' => Act::More,
+                    // Typed right after another key.
+                    b'r' => Act::Redo,
                     _ => Act::Capture,
                 };
                 self.teaching.act(act, self.worn.now());
@@ -138,6 +149,9 @@ impl<'a> Session<'a> {
         while let Some(news) = self.teaching.next_news() {
             self.hear(news, tell, drawn)?;
         }
+        if let Some(wrong) = self.shower.as_mut().and_then(Shower::look) {
+            self.say(wrong, false, tell, drawn);
+        }
         Ok(())
     }
 
@@ -149,6 +163,9 @@ impl<'a> Session<'a> {
                 }
                 if let Some(person) = &self.worn.person {
                     person.show(&target);
+                }
+                if let Some(shower) = &mut self.shower {
+                    shower.show(&target);
                 }
                 if drawn {
                     out::bell();
