@@ -79,3 +79,23 @@ pub fn stalls() -> Result<(), Failure> {
         .env("GAUNTLET_FIRMWARE", firmware),
     )
 }
+
+/// Live trainings by the virtual person: ten in honest gloves, fifty killed ones, a nonsense pair.
+pub fn teaching() -> Result<(), Failure> {
+    step::run(
+        "live trainings",
+        &mut cargo(&[
+            "test",
+            "--locked",
+            "--package",
+            "gauntlet",
+            "--lib",
+            "wearer::teaching",
+            "--",
+            "--ignored",
+            "--nocapture",
+            "--test-threads",
+            "1",
+        ]),
+    )
+}

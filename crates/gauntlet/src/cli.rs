@@ -8,8 +8,8 @@ use anyhow::Result;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::commands::{
-    bridge, calibrate, demo, doctor, eval, export, flash, glove, gripper, ports, record, reproduce,
-    settings, simulate, teleop, train,
+    bridge, calibrate, demo, doctor, eval, export, flash, glove, gripper, ports, record, report,
+    reproduce, settings, simulate, teleop, train,
 };
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
@@ -54,6 +54,8 @@ pub enum Verb {
     Train(Box<train::Train>),
     /// Measure how good a trained map is on given poses or samples.
     Eval(eval::Eval),
+    /// Draw what a hand's map does on one page: the verdict, which finger moves what, the pairs one by one.
+    Report(report::Report),
     /// Make the paper's tables and figures, with its numbers beside ours.
     Reproduce(reproduce::Reproduce),
     /// Make a virtual glove and a virtual gripper behind pseudo-terminals.
@@ -106,6 +108,7 @@ impl Verb {
             Self::Demo(options) => options.json,
             Self::Train(options) => options.json,
             Self::Eval(options) => options.json,
+            Self::Report(options) => options.json,
             Self::Reproduce(options) => options.json,
             Self::Simulate(_) => false,
             Self::Teleop(options) => options.json,
@@ -163,6 +166,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Demo(options) => demo::run(&options, &interrupt()?),
         Verb::Train(options) => train::run(&options, &interrupt()?),
         Verb::Eval(options) => eval::run(&options),
+        Verb::Report(options) => report::run(&options),
         Verb::Reproduce(options) => reproduce::run(&options, &interrupt()?),
         Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
         Verb::Teleop(options) => teleop::run(&options, &interrupt()?),

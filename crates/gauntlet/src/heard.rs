@@ -12,6 +12,8 @@ use host::failure::{Failure, OrFail};
 use rig::glove::VirtualGlove;
 use rig::person::{Attitude, Task};
 
+use crate::wearer::mimicked;
+
 /// Requests that are obeyed in one look.
 const AT_ONCE: usize = 16;
 
@@ -56,7 +58,7 @@ impl Ear {
     /// Obeys what was asked. Never waits.
     pub(crate) fn listen(&self) {
         for _ in 0..AT_ONCE {
-            let mut request = [0; 32];
+            let mut request = [0; virtual_person::LONGEST];
             match self.socket.recv(&mut request) {
                 Ok(count) => {
                     let text = request.get(..count).unwrap_or_default();
@@ -87,6 +89,7 @@ fn task(request: &str) -> Option<Task> {
         "thumb" => Task::Thumb,
         "free" => Task::Free,
         "move" => Task::Use(Attitude::PalmDown),
+        show if show.starts_with("show ") => mimicked(&virtual_person::counts_to_show(show)?)?,
         other => Task::Alone(virtual_person::finger(other.strip_prefix("bend ")?)?.number()),
     })
 }
@@ -110,6 +113,13 @@ mod tests {
             [Task::Fists, Task::Thumb, Task::Free, Task::Flat]
         );
         assert_eq!(task("move"), Some(Task::Use(Attitude::PalmDown)));
+        let shown = task(&virtual_person::request_to_show(&[
+            255.0, 0.0, 12.34, 130.0,
+        ]));
+        assert!(matches!(shown, Some(Task::Posture(angles)) if angles[3] > 0.5));
+        for other in ["show", "show 1 2", "show 1 x", "show nan 1 2 3"] {
+            assert_eq!(task(other), None, "{other}");
+        }
         for other in ["", "bend", "bend 5", "bend x", "flatter"] {
             assert_eq!(task(other), None, "{other}");
         }

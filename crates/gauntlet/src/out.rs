@@ -32,6 +32,17 @@ pub fn line(text: Arguments<'_>) {
     STDOUT.push(format!("{text}\n").as_bytes());
 }
 
+/// Whether a person sits at a terminal that can be drawn on, and has keys.
+pub fn is_drawn() -> bool {
+    use std::io::IsTerminal;
+    std::io::stdin().is_terminal() && std::io::stdout().is_terminal()
+}
+
+/// Rings the terminal's bell.
+pub fn bell() {
+    STDOUT.push(b"\x07");
+}
+
 /// Whether standard output takes nothing any more: its reader left, or its disk is full.
 pub fn closed() -> bool {
     STDOUT.fault().is_some()

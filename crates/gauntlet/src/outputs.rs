@@ -27,6 +27,8 @@ pub enum Kind {
     Image,
     /// A glove's profile, TOML.
     Profile,
+    /// A report, HTML.
+    Page,
 }
 
 impl Kind {
@@ -37,6 +39,7 @@ impl Kind {
             Self::Log => "an MCAP file",
             Self::Image => "a weights image",
             Self::Profile => "a glove's profile",
+            Self::Page => "an HTML page",
         }
     }
 
@@ -49,6 +52,7 @@ impl Kind {
             Self::Log => start.starts_with(b"\x89MCAP0\r\n"),
             Self::Image => start.starts_with(&hae::image::MAGIC),
             Self::Profile => start.starts_with(PROFILE),
+            Self::Page => start.starts_with(PAGE),
         }
     }
 }
@@ -85,6 +89,8 @@ const CHECKPOINT: &[u8] = b"\"settings_sha256\"";
 const MODEL: &[u8] = b"\"f.w1\"";
 /// How a profile begins.
 const PROFILE: &[u8] = b"# A glove on a hand,";
+/// How a page begins.
+const PAGE: &[u8] = b"<!doctype html>";
 /// The headers of both are shorter.
 const HEADER: u64 = 64 << 10;
 /// The room that a model, a checkpoint or an image may need.

@@ -2,16 +2,19 @@
 //! clock.
 
 mod calibrating;
+pub mod teaching;
 
 use std::fmt;
 
 use glove::calibration::Step;
-use glove::hand::{SEGMENT_COUNT, Side};
+use glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_COUNT, Side};
 use glove::imu::UniqueId;
 use host::calibration::virtual_person::VirtualPerson;
 use rig::PoseSource;
 use rig::glove::{Config, Honest, VirtualGlove};
 use rig::person::{Attitude, Playing, Task, Traits};
+use trainer::hand::{Scripted, Space};
+use trainer::operator::Operator;
 
 pub use calibrating::{Calibrated, Fit};
 
@@ -88,6 +91,14 @@ pub fn task(step: Step) -> Task {
         Step::Thumb => Task::Thumb,
         Step::Free => Task::Free,
     }
+}
+
+/// The hand pose that a virtual person shows for a gripper's counts; `None` for counts of no gripper.
+pub fn mimicked(counts: &[f32]) -> Option<Task> {
+    let space = Space::of_axes(counts.len())?;
+    let shown = Scripted::new(space, &LIMITS).demonstrate(counts).ok()?;
+    let shown = <[f32; JOINT_COUNT]>::try_from(shown).ok()?;
+    Some(Task::Posture(shown.map(f64::from)))
 }
 
 /// A virtual person who hears what a person is asked for.

@@ -226,3 +226,75 @@ fn a_glove_that_falls_silent_while_it_is_watched_is_a_failure_with_its_next_step
     );
     assert_eq!(failure["commands"][0][1], "doctor");
 }
+
+/// A person shows poses, is interrupted by a killed program, and goes on with what was kept; the page says what came of it.
+#[test]
+fn a_live_training_that_is_killed_goes_on_with_its_pairs_and_its_map_can_be_reported() {
+    let bench = Bench::new();
+    let poses = support::poses_file(bench.folder.path(), 400)
+        .display()
+        .to_string();
+    let [model, pairs] =
+        ["model.safetensors", "model.pairs.csv"].map(|name| bench.file(name).display().to_string());
+    let glove = bench.simulation.glove();
+    let live = |more: &[&str]| {
+        let words = [
+            "train", "--live", "--glove", &glove, "--ideal", "--poses", &poses, "--out", &model,
+        ];
+        let words: Vec<&str> = words
+            .iter()
+            .chain(&["--pairs", "1", "--epochs", "60", "--json"])
+            .chain(more)
+            .copied()
+            .collect();
+        start(&words)
+    };
+    let mut child = live(&[]);
+    let rest = until_said(&mut child, "pose 2 taken");
+    child.kill().unwrap();
+    child.wait().unwrap();
+    rest.join().unwrap();
+    let before = std::fs::read_to_string(&pairs).unwrap();
+    assert_eq!(before.lines().count(), 3, "{before}");
+    let refused = finish(live(&[]));
+    assert!(refusal(&refused, 2).contains("from an earlier session"));
+    let result = json(&finish(live(&["--resume", &pairs])));
+    assert_eq!(result["result"], "train --live", "{result}");
+    assert_eq!(result["pairs"], 3, "{result}");
+    assert!(
+        result["verdict"]
+            .as_str()
+            .unwrap()
+            .contains("volume occupancy"),
+        "{result}"
+    );
+    let after = std::fs::read_to_string(&pairs).unwrap();
+    assert!(
+        after.starts_with(&before) && after.lines().count() == 4,
+        "{after}"
+    );
+
+    let reported = json(&run(&[
+        "report", "--model", &model, "--poses", &poses, "--json",
+    ]));
+    assert!(
+        reported["verdict"]
+            .as_str()
+            .unwrap()
+            .contains("volume occupancy"),
+        "{reported}"
+    );
+    assert_eq!(reported["pairs"].as_array().unwrap().len(), 3);
+    let page = std::fs::read_to_string(bench.file("model.html")).unwrap();
+    assert!(
+        page.contains(reported["influence"][0].as_str().unwrap()),
+        "the sentences are on it"
+    );
+    // Nothing is fetched: no address but the names of SVG itself.
+    let addresses = page
+        .split("http")
+        .skip(1)
+        .filter(|rest| !rest.starts_with("://www.w3.org/") && !rest.starts_with("-equiv"));
+    assert_eq!(addresses.count(), 0);
+    assert!(page.matches("<svg").count() >= 5 && !page.contains("<script"));
+}

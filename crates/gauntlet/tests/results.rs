@@ -27,6 +27,8 @@ use host::next::{Command, Warning, advice};
 use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::settings::Value;
+use host::training::judgement::Named;
+use host::training::judgement::pairs::PairJudged;
 use host::training::model::Int16;
 use host::training::quality::{Bar, Measured, Quality};
 use host::training::recorded::Seen;
@@ -71,6 +73,14 @@ fn quality() -> Quality {
         measured_on: "held-out frames".to_owned(),
         bar: Bar::of(Space::ThreeFinger),
     }
+}
+
+fn faults() -> Vec<Named> {
+    vec![Named {
+        kind: "pair_odd",
+        what: "pair 3 does not fit the others".to_owned(),
+        advice: "show it again",
+    }]
 }
 
 fn measured() -> Measured {
@@ -252,6 +262,44 @@ fn results_of_maps_keep_their_names() {
         warnings: &warnings,
         quality: maps::Measures::Hand(&quality),
         good: Some(true),
+        verdict: Some("good enough to drive with".to_owned()),
+        faults: faults(),
+    };
+    let taught = maps::Taught {
+        model: path("model.safetensors"),
+        poses: path("model.poses.csv"),
+        pairs_file: path("model.pairs.csv"),
+        pairs: 10,
+        seed: 1,
+        refused: 1,
+        taken_back: 2,
+        next_pose_s: 0.2,
+        session_s: 150.0,
+        training_s: 6.0,
+        warnings: &warnings,
+        quality: maps::Measures::Hand(&quality),
+        good: Some(true),
+        verdict: Some("good enough to drive with".to_owned()),
+        faults: faults(),
+        off_pairs: Some((20.0, 6.0).into()),
+    };
+    let judged = [PairJudged {
+        target: vec![255.0],
+        mapped: vec![250.0],
+        off: 5.0,
+        left_out: 40.0,
+    }];
+    let reported = maps::Reported {
+        page: path("model.html"),
+        model: path("model.safetensors"),
+        poses: path("model.poses.csv"),
+        quality: maps::Measures::Hand(&quality),
+        good: true,
+        verdict: "good enough to drive with".to_owned(),
+        faults: faults(),
+        influence: vec!["finger A: your thumb closes it by 200".to_owned()],
+        least_reached: "all fingers open is reached least: nearest 30 counts".to_owned(),
+        pairs: Some(&judged),
     };
     let paused = maps::Paused {
         model: None,
@@ -265,6 +313,8 @@ fn results_of_maps_keep_their_names() {
         held_out: Some(true),
         quality: maps::Measures::Domains(&measured),
         good: None,
+        verdict: None,
+        faults: Vec::new(),
     };
     let exported = maps::Exported {
         image: path("weights.hae"),
@@ -292,6 +342,8 @@ fn results_of_maps_keep_their_names() {
         "maps.json",
         &[
             sample("train", trained),
+            sample("train --live", taught),
+            sample("report", reported),
             sample("train", paused),
             sample("eval", evaluated),
             sample("export", exported),

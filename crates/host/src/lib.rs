@@ -8,6 +8,7 @@
 //! | [`recording`] | the session log |
 //! | [`calibration`] | a glove calibrated by a person, or from a recorded session; its profile |
 //! | [`settings`] | what a person prefers, from a file |
+//! | [`teaching`] | a person who shows the hand poses that a map is trained with |
 //! | [`training`] | maps of hands, and of other domains, from files |
 //! | [`chip`] | the host protocol, and the emulator |
 //! | [`diagnose`] | what is wrong with a line, and what to do |
@@ -40,6 +41,7 @@ pub mod scanning;
 pub mod session;
 pub mod settings;
 pub mod stats;
+pub mod teaching;
 mod toml_file;
 pub mod training;
 pub mod words;

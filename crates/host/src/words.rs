@@ -25,6 +25,37 @@ pub fn line_speed(baud: Option<u32>) -> String {
     }
 }
 
+/// Counts in words: "finger A closed, fingers B and C open, scissor wide".
+pub fn gripper_words(counts: &[f32]) -> String {
+    let closed = |count: f32| match count {
+        ..26.0 => "open",
+        26.0..90.0 => "a quarter closed",
+        90.0..166.0 => "half closed",
+        166.0..230.0 => "nearly closed",
+        _ => "closed",
+    };
+    let [a, b, c, scissor] = counts else {
+        let all = counts.first().copied().unwrap_or(0.0);
+        return format!("fingers {}", closed(all));
+    };
+    let scissor = match scissor {
+        ..50.0 => "wide",
+        50.0..100.0 => "rather wide",
+        100.0..166.0 => "in the middle",
+        166.0..215.0 => "rather narrow",
+        _ => "in a pinch",
+    };
+    let [a, b, c] = [*a, *b, *c].map(closed);
+    let fingers = match (a == b, b == c) {
+        (true, true) => format!("all fingers {a}"),
+        (true, false) => format!("fingers A and B {a}, finger C {c}"),
+        (false, true) => format!("finger A {a}, fingers B and C {b}"),
+        (false, false) if a == c => format!("fingers A and C {a}, finger B {b}"),
+        (false, false) => format!("finger A {a}, finger B {b}, finger C {c}"),
+    };
+    format!("{fingers}, scissor {scissor}")
+}
+
 /// The fingers, thumb first: each has five joint angles in a row.
 pub const FINGER_NAMES: [&str; 5] = ["thumb", "index", "middle", "ring", "little"];
 

@@ -98,6 +98,18 @@ impl Motion {
         }
     }
 
+    /// The motion in small steps, radians.
+    #[must_use]
+    pub fn way(&self) -> &Matrix {
+        &self.way
+    }
+
+    /// Its image, counts.
+    #[must_use]
+    pub fn image(&self) -> &Matrix {
+        &self.image
+    }
+
     /// Figure 12: every second of the 25 poses. `joints` names the hand's columns.
     ///
     /// # Errors

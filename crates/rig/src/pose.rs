@@ -38,19 +38,21 @@ pub const RISE_S: f64 = 1.0;
 ///
 /// It lies flat from when the glove's port is opened until the first sensor has been read for [`FLAT_S`], goes to the
 /// motion's beginning in [`RISE_S`], and plays the motion from there. When the port is opened anew it lies flat anew. Asked to
-/// lie flat it goes there in [`RISE_S`], and lies until it is asked to move.
+/// lie flat, or for a posture, it goes there in [`RISE_S`], and stays until it is asked to move.
 pub struct FlatFirst {
     motion: Box<dyn PoseSource>,
     /// When its motion begins or began; `None` before it was first asked since the port was opened.
     begins: Option<f64>,
-    asked: Option<bool>,
+    /// The posture that was asked for (flat: zeros), or to move.
+    asked: Option<Option<[f32; 25]>>,
     lying: Option<Lying>,
 }
 
-/// Asked to lie flat.
+/// Asked to lie flat, or for a posture.
 struct Lying {
     since: f64,
     from: [f32; 25],
+    to: [f32; 25],
     /// When it may move again.
     until: f64,
 }
@@ -70,7 +72,9 @@ impl FlatFirst {
     fn pose(&mut self, time_s: f64) -> [f32; 25] {
         if let Some(lying) = self.lying.as_ref().filter(|lying| time_s < lying.until) {
             let there = smooth((time_s - lying.since) / RISE_S);
-            return lying.from.map(|angle| angle * (1.0 - there));
+            return std::array::from_fn(|joint| {
+                lying.from[joint] + (lying.to[joint] - lying.from[joint]) * there
+            });
         }
         let time = time_s - *self.begins.get_or_insert(time_s + FLAT_S);
         if !time.is_finite() || time <= 0.0 {
@@ -81,19 +85,29 @@ impl FlatFirst {
         pose.map(|angle| angle * there)
     }
 
-    fn turn(&mut self, flat: bool, now: f64) {
-        match &mut self.lying {
-            Some(lying) if !flat && lying.until.is_infinite() => {
+    fn turn(&mut self, asked: Option<[f32; 25]>, now: f64) {
+        const FLAT: [f32; 25] = [0.0; 25];
+        let from = self.pose(now);
+        match (&mut self.lying, asked) {
+            // From a posture it goes by way of the flat hand, where the motion begins.
+            (Some(lying), None) if lying.until.is_infinite() && lying.to != FLAT => {
+                (lying.since, lying.from, lying.to) = (now, from, FLAT);
+                lying.until = now + RISE_S;
+                self.begins = Some(lying.until);
+            }
+            (Some(lying), None) if lying.until.is_infinite() => {
                 // Not before it lies.
                 lying.until = now.max(lying.since + RISE_S);
                 self.begins = Some(lying.until);
             }
-            Some(lying) if flat && lying.until > now => lying.until = f64::INFINITY,
-            _ if flat => {
-                let from = self.pose(now);
+            (Some(lying), Some(to)) if lying.until > now && lying.to == to => {
+                lying.until = f64::INFINITY;
+            }
+            (_, Some(to)) => {
                 self.lying = Some(Lying {
                     since: now,
                     from,
+                    to,
                     until: f64::INFINITY,
                 });
             }
@@ -110,8 +124,8 @@ fn smooth(t: f64) -> f32 {
 
 impl PoseSource for FlatFirst {
     fn pose_at(&mut self, time_s: f64) -> [f32; 25] {
-        if let Some(flat) = self.asked.take() {
-            self.turn(flat, time_s);
+        if let Some(asked) = self.asked.take() {
+            self.turn(asked, time_s);
         }
         self.pose(time_s)
     }
@@ -122,14 +136,15 @@ impl PoseSource for FlatFirst {
     }
 
     fn lie_flat(&mut self, flat: bool) {
-        self.asked = Some(flat);
+        self.asked = Some(flat.then_some([0.0; 25]));
     }
 
-    /// It knows two things: to lie flat, and to move.
+    /// It knows three things: to lie flat, to show a posture, and to move.
     fn ask(&mut self, task: Task) {
         match task {
             Task::Flat => self.lie_flat(true),
             Task::Use(_) => self.lie_flat(false),
+            Task::Posture(angles) => self.asked = Some(Some(angles.map(|angle| angle as f32))),
             _ => {}
         }
     }
@@ -300,6 +315,24 @@ mod tests {
             assert_eq!(hand.pose_at(74.5), row(1.5));
             hand.opened();
         }
+    }
+
+    #[test]
+    fn asked_for_a_posture_it_goes_there_and_from_there_to_its_motion_without_a_jump() {
+        let mut hand = FlatFirst::new(Box::new(|_: f64| row(1.0)));
+        hand.pose_at(0.0);
+        assert_eq!(hand.pose_at(10.0), row(1.0));
+        hand.ask(Task::Posture([0.3; 25]));
+        hand.pose_at(10.0);
+        assert_eq!(hand.pose_at(11.5), row(0.3));
+        hand.ask(Task::Use(crate::person::Attitude::PalmDown));
+        let mut before = hand.pose_at(20.0)[0];
+        for step in 1..=3_000 {
+            let angle = hand.pose_at(20.0 + f64::from(step) * 1e-3)[0];
+            assert!((angle - before).abs() < 0.002, "{step}");
+            before = angle;
+        }
+        assert_eq!(before, 1.0);
     }
 
     #[test]

@@ -12,6 +12,7 @@ mod clock;
 mod drive;
 mod settings;
 pub mod starts;
+mod taught;
 #[cfg(test)]
 mod tests;
 

@@ -19,6 +19,8 @@ const READS: usize = 8;
 /// Start of a paste and its end, as terminals mark them.
 const PASTE_BEGINS: &[u8] = b"\x1b[200~";
 const PASTE_ENDS: &[u8] = b"\x1b[201~";
+/// Keys without a meaning of their own that are kept until somebody asks for them.
+const OTHERS: usize = 8;
 const CTRL_C: u8 = 3;
 const CTRL_D: u8 = 4;
 const ESCAPE: u8 = 0x1b;
@@ -52,6 +54,8 @@ pub(super) struct Keyboard {
     paste: Option<Instant>,
     /// What comes is text, until then.
     text: Option<Instant>,
+    /// Keys that have no meaning of their own, each pressed by itself: 0 stands for one that sends more than a byte.
+    others: Vec<u8>,
 }
 
 impl Keyboard {
@@ -60,6 +64,11 @@ impl Keyboard {
             bindings,
             ..Self::default()
         }
+    }
+
+    /// Keys pressed since the last call that have no meaning of their own; at most [`OTHERS`].
+    pub(super) fn others(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.others)
     }
 
     /// Keys pressed since the last call; [`Key::End`] when the terminal is gone.
@@ -114,6 +123,8 @@ impl Keyboard {
                 typed.push(ESCAPE);
             } else if after.is_empty() && PASTE_ENDS.starts_with(sequence) && sequence.len() > 1 {
                 self.rest = sequence.to_vec();
+            } else if sequence.len() > 2 && after.is_empty() && !self.pasting(now) {
+                self.other(0);
             }
             left = after;
         }
@@ -126,6 +137,12 @@ impl Keyboard {
             *until = now + PASTE;
         }
         self.paste.is_some()
+    }
+
+    fn other(&mut self, byte: u8) {
+        if self.others.len() < OTHERS {
+            self.others.push(byte);
+        }
     }
 
     fn typed(&mut self, typed: &[u8], now: Instant) -> Vec<Key> {
@@ -159,6 +176,9 @@ impl Keyboard {
                 vec![Key::End]
             }
             _ => {
+                if let [byte] = typed {
+                    self.other(*byte);
+                }
                 self.text = Some(now + TEXT);
                 Vec::new()
             }

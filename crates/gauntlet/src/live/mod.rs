@@ -13,6 +13,7 @@ mod parts;
 mod postures;
 mod raw;
 mod small;
+pub mod teach;
 mod view;
 
 use std::io::IsTerminal;
@@ -132,6 +133,8 @@ pub struct Live {
     looked: Option<Duration>,
     /// When the space bar was pressed last.
     space: Option<Duration>,
+    /// The newest other key, and when it was pressed.
+    other: Option<(u8, Duration)>,
     /// Whether somebody sits at a terminal, who may close it.
     terminal: bool,
 }
@@ -167,6 +170,7 @@ impl Live {
             shown: None,
             looked: None,
             space: None,
+            other: None,
             terminal,
         })
     }
@@ -238,6 +242,21 @@ impl Live {
             self.space = Some(now);
         }
         Ok(if old || repeated { safe(keys) } else { keys })
+    }
+
+    /// Keys without a meaning of their own, pressed one by one since the last call of [`Live::keys`]: 0 for one that sends more than a
+    /// byte. One that is held down counts once.
+    pub fn others(&mut self) -> Vec<u8> {
+        let Target::Drawn(drawn) = &mut self.target else {
+            return Vec::new();
+        };
+        let now = since_boot();
+        let mut pressed = drawn.keyboard.others();
+        pressed.retain(|key| {
+            let before = self.other.replace((*key, now));
+            before.is_none_or(|(k, at)| k != *key || now.saturating_sub(at) >= REPEATS)
+        });
+        pressed
     }
 
     /// Gives the terminal back while `stop` stops this program, and takes it again when it goes on.

@@ -7,6 +7,8 @@ use serde::Serialize;
 
 use host::chip::link::Flashed;
 use host::next::{NextStep, Warning};
+use host::training::judgement::Named;
+use host::training::judgement::pairs::PairJudged;
 use host::training::model::Int16;
 use host::training::quality::{Measured, Quality};
 
@@ -68,6 +70,62 @@ pub struct Trained<'a> {
     pub quality: Measures<'a>,
     /// Whether a hand's map is worth driving with; `null` for other domains.
     pub good: Option<bool>,
+    /// The verdict in a line; `null` for other domains.
+    pub verdict: Option<String>,
+    /// What is wrong with the map, the worst first.
+    pub faults: Vec<Named>,
+}
+
+/// How far a map is off its reference pairs, counts.
+#[derive(Debug, Serialize)]
+pub struct OffPairs {
+    /// At the pair and the axis where it is most.
+    pub most: f32,
+    /// Of half of the pairs it is less.
+    pub median: f32,
+}
+
+impl From<(f32, f32)> for OffPairs {
+    fn from((most, median): (f32, f32)) -> Self {
+        Self { most, median }
+    }
+}
+
+/// `train --live` to its end.
+#[derive(Debug, Serialize)]
+pub struct Taught<'a> {
+    /// The model's file.
+    pub model: &'a Path,
+    /// The file of the hand's motion.
+    pub poses: &'a Path,
+    /// The file of the pairs, start poses first.
+    pub pairs_file: &'a Path,
+    /// Reference pairs.
+    pub pairs: usize,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Poses that were refused.
+    pub refused: usize,
+    /// How often pairs were taken back or brought back.
+    pub taken_back: usize,
+    /// The longest time from a pose taken to the next one asked, s.
+    pub next_pose_s: f64,
+    /// From the glove opened to the last pose, and the training, s.
+    pub session_s: f64,
+    /// How long the training took, s.
+    pub training_s: f64,
+    /// What a person should know.
+    pub warnings: &'a [Warning],
+    /// How good the map is.
+    pub quality: Measures<'a>,
+    /// Whether a hand's map is worth driving with; `null` for other domains.
+    pub good: Option<bool>,
+    /// The verdict in a line; `null` for other domains.
+    pub verdict: Option<String>,
+    /// What is wrong with the map, the worst first.
+    pub faults: Vec<Named>,
+    /// How far the map is off its pairs; `null` for other domains.
+    pub off_pairs: Option<OffPairs>,
 }
 
 /// `train` stopped on the way (`--stop-at`).
@@ -97,6 +155,35 @@ pub struct Evaluated<'a> {
     pub quality: Measures<'a>,
     /// Whether a hand's map is worth driving with; `null` for other domains.
     pub good: Option<bool>,
+    /// The verdict in a line; `null` for other domains.
+    pub verdict: Option<String>,
+    /// What is wrong with the map, the worst first.
+    pub faults: Vec<Named>,
+}
+
+/// `report`.
+#[derive(Debug, Serialize)]
+pub struct Reported<'a> {
+    /// The page's file.
+    pub page: &'a Path,
+    /// The model's file.
+    pub model: &'a Path,
+    /// The file of the poses it is judged on.
+    pub poses: &'a Path,
+    /// How good the map is.
+    pub quality: Measures<'a>,
+    /// Whether it is worth driving with.
+    pub good: bool,
+    /// The verdict in a line.
+    pub verdict: String,
+    /// What is wrong with the map, the worst first.
+    pub faults: Vec<Named>,
+    /// Which finger moves what, in words: a sentence an axis.
+    pub influence: Vec<String>,
+    /// The corner of the gripper's space that is reached least, in words.
+    pub least_reached: String,
+    /// The reference pairs one by one; `null` where they are not known.
+    pub pairs: Option<&'a [PairJudged]>,
 }
 
 /// `export`.

@@ -1,7 +1,8 @@
 //! The virtual person of `gauntlet simulate` hears what a person is asked for: on a socket beside the virtual glove's link.
 //!
 //! A glove at `/tmp/glove` has its person at `/tmp/glove.person`; a real port has none. One datagram is one request in words: `flat`,
-//! `turn`, `bend` and a finger's number (0 thumb to 4 little), `fists`, `thumb`, `free`; `move` lets the hand do as it likes.
+//! `turn`, `bend` and a finger's number (0 thumb to 4 little), `fists`, `thumb`, `free`; `show` and a gripper's counts asks for the hand
+//! pose that this person would show for them; `move` lets the hand do as it likes.
 
 use std::os::unix::ffi::OsStrExt;
 use std::os::unix::net::UnixDatagram;
@@ -34,6 +35,21 @@ pub fn finger(number: &str) -> Option<Finger> {
     Finger::ALL.get(number).copied()
 }
 
+/// The longest request, bytes.
+pub const LONGEST: usize = 64;
+
+/// A request to show the hand pose that belongs to a gripper's counts, as it is sent.
+pub fn request_to_show(counts: &[f32]) -> String {
+    let counts: Vec<String> = counts.iter().map(|count| format!("{count:.1}")).collect();
+    format!("show {}", counts.join(" "))
+}
+
+/// The counts of such a request; `None` for any other.
+pub fn counts_to_show(request: &str) -> Option<Vec<f32>> {
+    let counts = request.strip_prefix("show ")?.split(' ');
+    counts.map(|count| count.parse().ok()).collect()
+}
+
 /// The way to one.
 #[derive(Debug)]
 pub struct VirtualPerson(UnixDatagram);
@@ -50,6 +66,11 @@ impl VirtualPerson {
     /// Asks for a step. One that has gone does not hear it.
     pub fn ask(&self, step: Step) {
         let _ = self.0.send(request(step).as_bytes());
+    }
+
+    /// Asks for the hand pose that belongs to a gripper's counts.
+    pub fn show(&self, counts: &[f32]) {
+        let _ = self.0.send(request_to_show(counts).as_bytes());
     }
 
     /// Lets the hand do as it likes.

@@ -183,7 +183,7 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
         training.clone()
     };
     let (pairs, pairs_from) = plan(request, truth.as_ref(), reference, &training)?;
-    let operator: Box<dyn Operator> = match &truth {
+    let operator: Box<dyn Operator + Send> = match &truth {
         Some(truth) => Box::new(GroundTruth::new(truth.clone()).map_err(told)?),
         None => Box::new(Nobody),
     };

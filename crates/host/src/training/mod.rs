@@ -2,11 +2,15 @@
 
 pub mod domains;
 pub mod hand;
+pub mod judgement;
 mod learn;
+pub mod lessons;
 pub mod model;
 pub mod motion;
 pub mod movements;
 mod pairs;
+pub mod pairs_kept;
+pub mod prompts;
 pub mod quality;
 pub mod recorded;
 mod task;

@@ -18,6 +18,7 @@ use trainer::operator::Operator;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::next::Warning;
+use crate::training::pairs_kept;
 use crate::training::quality::Measured;
 
 /// Share of the frames that train; the rest measure (381 + 254 of the paper's 635).
@@ -44,7 +45,7 @@ pub struct Task {
     pub(super) answers: Option<String>,
     pub(super) units: Units,
     pub(super) pairs: PairPlan,
-    pub(super) operator: Box<dyn Operator>,
+    pub(super) operator: Box<dyn Operator + Send>,
     /// The factors of the cost where nothing else is said.
     pub(super) lambda: Lambda,
     /// The starts where nothing else is said.
@@ -227,6 +228,11 @@ impl Task {
         plan.stage_epochs * self.pairs.count() + plan.last_epochs
     }
 
+    /// All input samples, in units of their own.
+    pub fn inputs(&self) -> &Matrix {
+        &self.inputs
+    }
+
     /// Reference pairs that are there from the start.
     pub fn start_pairs(&self) -> usize {
         self.pairs.start().inputs.rows
@@ -336,6 +342,11 @@ impl Task {
             .into_iter()
             .map(|(key, value)| (key.to_owned(), value))
             .collect();
+        let pairs = Pairs {
+            inputs: self.units.q.invert_all(&learned.trained.pairs.inputs),
+            targets: self.units.x.invert_all(&learned.trained.pairs.targets),
+        };
+        pairs_kept::keep(&pairs, &mut model.metadata);
     }
 }
 

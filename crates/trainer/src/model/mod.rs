@@ -84,6 +84,17 @@ impl Normalisation {
         normalised
     }
 
+    /// All samples back to the domain's units.
+    #[must_use]
+    pub fn invert_all(&self, samples: &crate::data::Matrix) -> crate::data::Matrix {
+        let mut inverted = samples.clone();
+        for row in 0..samples.rows {
+            let values = self.invert(samples.row(row));
+            inverted.row_mut(row).copy_from_slice(&values);
+        }
+        inverted
+    }
+
     fn columns<'a>(&'a self, values: &'a [f32]) -> impl Iterator<Item = (f64, f64, f64)> + 'a {
         let parameters = self.offset.iter().zip(&self.scale);
         values

@@ -24,7 +24,7 @@ use host::words;
 const SENSORS_WAIT: Duration = Duration::from_secs(15);
 
 /// Where it is.
-pub(super) enum Place<'a> {
+pub(in crate::commands) enum Place<'a> {
     Port(GloveAt),
     Chip(&'a Address),
 }

@@ -17,7 +17,9 @@ use crate::note;
 use crate::progress::Person;
 use crate::results::{self, maps};
 use host::failure::{Failure, told};
+use host::training::judgement::Judgement;
 use host::training::motion::Motion;
+use host::training::pairs_kept::reference_pairs;
 use host::training::quality::{Measured, Quality, TARGETS};
 use host::training::{domains, model};
 
@@ -49,17 +51,13 @@ fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
         &space.samples(TARGETS, options.seed, Draw::Measure),
         format!("frames of {}", poses.display()),
     );
+    let pairs = reference_pairs(&model);
+    let judgement = Judgement::of((&model, space), &frames, pairs.as_ref(), quality);
     if options.json {
-        let good = Some(quality.good());
-        return print(
-            options,
-            &model,
-            held_out,
-            maps::Measures::Hand(&quality),
-            good,
-        );
+        let quality = maps::Measures::Hand(&judgement.quality);
+        return print(options, &model, held_out, quality, Some(&judgement));
     }
-    show::hand(&options.model, &model, &quality);
+    show::hand(&options.model, &model, &judgement);
     Ok(())
 }
 
@@ -113,14 +111,16 @@ fn print(
     model: &Model,
     held_out: Option<bool>,
     quality: maps::Measures<'_>,
-    good: Option<bool>,
+    judgement: Option<&Judgement>,
 ) -> Result<()> {
     let evaluated = maps::Evaluated {
         model: &options.model,
         metadata: &model.metadata,
         held_out,
         quality,
-        good,
+        good: judgement.map(Judgement::good),
+        verdict: judgement.map(ToString::to_string),
+        faults: judgement.map(Judgement::named).unwrap_or_default(),
     };
     results::print("eval", evaluated)
 }

@@ -5,10 +5,12 @@ use std::path::Path;
 use trainer::model::Model;
 
 use crate::say;
-use host::training::quality::{Measured, Quality};
+use host::training::judgement::Judgement;
+use host::training::quality::Measured;
 
 /// The measures of a hand's map.
-pub(super) fn hand(file: &Path, model: &Model, quality: &Quality) {
+pub(super) fn hand(file: &Path, model: &Model, judgement: &Judgement) {
+    let quality = &judgement.quality;
     say!("model              {}", file.display());
     say!(
         "measured on        {} {}",
@@ -26,13 +28,7 @@ pub(super) fn hand(file: &Path, model: &Model, quality: &Quality) {
         .d_knn
         .map_or_else(String::new, |most| format!("   (good: {most} or less)"));
     say!("d-Knn              {:.3}{bar}", quality.d_knn);
-    say!(
-        "verdict            {}",
-        quality
-            .fault()
-            .as_deref()
-            .unwrap_or("good enough to drive with")
-    );
+    say!("verdict            {judgement}");
     trained_with(model);
 }
 

@@ -1,6 +1,5 @@
 //! `gauntlet record`: what `train` needs, from a glove on a port: a person's hand as a poses file.
 
-mod prompts;
 mod session;
 
 use std::path::PathBuf;

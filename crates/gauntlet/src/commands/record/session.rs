@@ -3,7 +3,6 @@
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
-use super::prompts::{GUIDED, Prompt, again, free};
 use crate::out;
 use crate::progress::Progress;
 use crate::results::gloves;
@@ -12,6 +11,7 @@ use host::recording::poses::Row;
 use host::scanning::{Hand, Scanned, Scanning};
 use host::stats::short_or_dash;
 use host::training::movements::Movements;
+use host::training::prompts::{GUIDED, Prompt, again, free};
 use host::training::recorded::names;
 
 /// Pause between two looks.

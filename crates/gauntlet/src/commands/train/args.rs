@@ -6,7 +6,9 @@ use clap::{ArgGroup, Args, ValueEnum};
 use host::lines::Model;
 use host::training::PairChoice;
 
+use crate::commands::teleop::Hand as WhichHand;
 use crate::options::model_parser;
+use host::chip::link::Address;
 use trainer::cost::Cost;
 use trainer::measures::Coverage;
 use trainer::network::Initialisation;
@@ -14,7 +16,7 @@ use trainer::network::Initialisation;
 /// Options of `train`.
 #[derive(Debug, Args)]
 #[command(
-    group(ArgGroup::new("data").required(true).args(["poses", "input"])),
+    group(ArgGroup::new("data").required(true).multiple(true).args(["poses", "input", "live"])),
     after_help = "\
 Examples:
   gauntlet train --poses my_hand.csv --out model.safetensors
@@ -25,6 +27,8 @@ Examples:
   gauntlet train --input Q.csv --target X.csv --pairs-file PAIRS.csv --cost hae --alpha 0 --out map.safetensors
   gauntlet train --poses my_hand.csv --out model.safetensors --checkpoint half.checkpoint    (Ctrl-C stops it)
   gauntlet train --poses my_hand.csv --out model.safetensors --resume half.checkpoint
+  gauntlet train --live --glove /dev/ttyUSB0 --out model.safetensors    (you show the poses: docs/teach.md)
+  gauntlet train --live --glove /dev/ttyUSB0 --out model.safetensors --resume model.pairs.csv
 
 Hands: CSV with a header, optional `time_s` first, then the 25 joint angles in radians (docs/tool.md lists \
 them). A script answers for the person who would show the hand pose that belongs to a gripper pose.
@@ -33,7 +37,7 @@ q0… and x0…; values are taken as they are. 60 % of the rows train, the rest 
 )]
 pub struct Train {
     /// The hand poses to train on.
-    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["target", "truth", "normalise", "force", "hidden", "epsilon", "volume", "dim"])]
+    #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["input", "truth", "normalise", "force", "hidden", "epsilon", "volume", "dim"])]
     pub poses: Option<PathBuf>,
     /// The gripper that the hand will move.
     #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f", conflicts_with = "input")]
@@ -41,12 +45,19 @@ pub struct Train {
     /// Samples of the input domain, columns q0, q1, …
     #[arg(long, value_name = "Q.csv", requires = "target")]
     pub input: Option<PathBuf>,
-    /// Samples of the target domain, columns x0, x1, …
-    #[arg(long, value_name = "X.csv", requires = "input")]
+    /// Samples of the target domain, columns x0, x1, …; with --live instead of a gripper.
+    #[arg(long, value_name = "X.csv")]
     pub target: Option<PathBuf>,
     /// Where the trained model goes. A model that is there is replaced; anything else never.
     #[arg(long, value_name = "MODEL.safetensors")]
     pub out: PathBuf,
+
+    /// Show the hand poses yourself: with a glove on, mimic the gripper poses that are asked for.
+    #[arg(long, conflicts_with_all = ["input", "pairs_file", "no_start_pairs", "checkpoint", "stop_at"])]
+    pub live: bool,
+    /// Where the glove of --live is.
+    #[command(flatten)]
+    pub worn: Worn,
 
     /// True pairs, columns q0… and x0…: they answer for adaptive and random pairs, and NMSE is measured with them.
     #[arg(long, value_name = "PAIRS.csv", requires = "input")]
@@ -116,7 +127,8 @@ pub struct Train {
     /// Keep the state of the training here: every minute, and when it is stopped (Ctrl-C, --stop-at).
     #[arg(long, value_name = "FILE")]
     pub checkpoint: Option<PathBuf>,
-    /// Go on from this checkpoint of the same data and options; the result is that of an unbroken training, bit for bit.
+    /// Go on from this checkpoint of the same data and options; the result is that of an unbroken training, bit for bit. With --live:
+    /// from the pairs file that it keeps beside its model.
     #[arg(long, value_name = "FILE")]
     pub resume: Option<PathBuf>,
     /// Stop after this epoch and keep the state.
@@ -126,6 +138,39 @@ pub struct Train {
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
+}
+
+/// The glove of `--live`.
+#[derive(Debug, Args)]
+pub struct Worn {
+    /// The glove's serial port.
+    #[arg(long, value_name = "PORT", requires = "live")]
+    pub glove: Option<PathBuf>,
+    /// The glove of the bridge on a chip there: a serial port, unix:PATH or tcp:HOST:PORT.
+    #[arg(long, value_name = "PORT", requires = "live", conflicts_with_all = ["glove", "profile", "ideal"])]
+    pub bridge: Option<Address>,
+    /// The glove's profile, if not the one that is found by its sensors' ids.
+    #[arg(
+        long,
+        value_name = "FILE.toml",
+        requires = "live",
+        conflicts_with = "ideal"
+    )]
+    pub profile: Option<PathBuf>,
+    /// Take the sensors as ideal: sewn on straight, with one heading. Virtual gloves only.
+    #[arg(long, requires = "live")]
+    pub ideal: bool,
+    /// Which hand wears the glove, where no profile says.
+    #[arg(long, value_enum, default_value_t = WhichHand::Right)]
+    pub hand: WhichHand,
+    /// Show each pose on the gripper at this port, too: the fingers move, slowly. It must be activated. Without it nothing moves.
+    #[arg(
+        long,
+        value_name = "PORT",
+        requires = "live",
+        conflicts_with = "target"
+    )]
+    pub show_on: Option<PathBuf>,
 }
 
 /// What the volume occupancy of a domain from a file needs.

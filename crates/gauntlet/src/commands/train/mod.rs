@@ -2,6 +2,7 @@
 
 mod args;
 mod files;
+mod live;
 mod request;
 mod show;
 
@@ -19,6 +20,8 @@ use host::failure::told;
 use host::interrupt::Interrupt;
 use host::stats::seconds;
 use host::training::Ended;
+use host::training::judgement::Judgement;
+use host::training::pairs_kept::reference_pairs;
 use host::training::quality::Quality;
 
 /// Trains on a recording of a hand, or on samples of any two domains.
@@ -26,6 +29,9 @@ use host::training::quality::Quality;
 /// # Errors
 /// A failure that names the file and what is wrong with it.
 pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
+    if options.live {
+        return live::run(options, interrupt);
+    }
     let tell = Tell::new(options.json);
     files::check_outputs(options)?;
     let mut task = reading::ended_by(interrupt, "what is to be trained on", || {
@@ -47,6 +53,11 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let is_hand = options.poses.is_some();
     let quality = Quality::from_measured(&measured, request::space(options));
     let unfit = if is_hand { quality.unfit() } else { None };
+    let judgement = is_hand.then(|| {
+        let space = (&model, request::space(options));
+        let pairs = reference_pairs(&model);
+        Judgement::of(space, task.inputs(), pairs.as_ref(), quality.clone())
+    });
     for warning in measured.far_from_truth().into_iter().chain(unfit) {
         note!("warning: {warning}");
         learned.warnings.push(warning);
@@ -64,7 +75,9 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
                 true => maps::Measures::Hand(&quality),
                 false => maps::Measures::Domains(&measured),
             },
-            good: is_hand.then(|| quality.good()),
+            good: judgement.as_ref().map(Judgement::good),
+            verdict: judgement.as_ref().map(ToString::to_string),
+            faults: judgement.as_ref().map(Judgement::named).unwrap_or_default(),
         };
         return results::print("train", trained);
     }
@@ -80,6 +93,9 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     };
     for line in lines {
         tell.say(format_args!("quality    {line}"));
+    }
+    if let Some(judgement) = &judgement {
+        tell.say(format_args!("verdict    {judgement}"));
     }
     tell.say(format_args!("model      {}", options.out.display()));
     Ok(())

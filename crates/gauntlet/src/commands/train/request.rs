@@ -20,6 +20,11 @@ pub(super) fn space(options: &Train) -> Space {
 /// What to train on, read and told.
 pub(super) fn task(options: &Train, tell: &Tell) -> Result<Task> {
     match (&options.poses, &options.input, &options.target) {
+        (Some(_), _, Some(_)) => Err(Failure::usage(
+            "--target with --poses needs somebody who shows the hand poses",
+            "--live, or --input instead of --poses",
+        )
+        .into()),
         (Some(poses), ..) => {
             let motion = Motion::open_for_training(Some(poses), options.seed, &Person)?;
             tell.say(format_args!("poses      {}", motion.describe()));

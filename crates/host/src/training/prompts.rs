@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use host::training::movements::Movement;
+use super::movements::Movement;
 
 /// One thing to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Prompt {
+pub struct Prompt {
     /// In words.
     pub ask: &'static str,
     /// How long.
@@ -24,7 +24,7 @@ const fn prompt(ask: &'static str, seconds: u64, shows: &'static [Movement]) -> 
 }
 
 /// All of them, one after another.
-pub(super) const GUIDED: [Prompt; 10] = [
+pub const GUIDED: [Prompt; 10] = [
     prompt(
         "open the hand flat, make a fist, open it: again and again",
         10,
@@ -74,7 +74,7 @@ pub(super) const GUIDED: [Prompt; 10] = [
 ];
 
 /// No prompts: for `time`.
-pub(super) const fn free(time: Duration) -> Prompt {
+pub const fn free(time: Duration) -> Prompt {
     Prompt {
         ask: "move the hand: fist and flat, each finger alone, several together, fingertips gathered, fingers spread",
         time,
@@ -83,7 +83,7 @@ pub(super) const fn free(time: Duration) -> Prompt {
 }
 
 /// What to ask once more for what was not seen.
-pub(super) fn again(missing: &[Movement]) -> Vec<Prompt> {
+pub fn again(missing: &[Movement]) -> Vec<Prompt> {
     let lacks = |prompt: &&Prompt| prompt.shows.iter().any(|shown| missing.contains(shown));
     GUIDED.iter().filter(lacks).copied().collect()
 }

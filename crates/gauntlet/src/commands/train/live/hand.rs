@@ -1,0 +1,242 @@
+//! The hand in the glove: opened, laid flat, moved freely.
+
+use std::time::{Duration, Instant};
+
+use anyhow::Result;
+use glove::calibration::Step;
+use glove::hand::JOINT_COUNT;
+
+use super::side;
+use crate::commands::calibrate::source::{Place, Source};
+use crate::commands::train::args::Train;
+use crate::live::teach::{Doing, TeachView};
+use crate::live::{Key, Live};
+use crate::out;
+use crate::run::{ASK_FLAT, FLAT_WAIT};
+use crate::tell::Tell;
+use host::calibration::profile_of;
+use host::calibration::virtual_person::VirtualPerson;
+use host::clock::ticks;
+use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
+use host::next::{Command, NextStep};
+use host::scanning::{Flat, Hand, Pose};
+use host::teaching::Free;
+use host::training::recorded::names;
+
+/// Pause between two looks.
+pub(super) const ROUND: Duration = Duration::from_millis(20);
+/// A glove that is silent for so long ends the session.
+const SILENT: Duration = Duration::from_secs(10);
+/// What stands in the way of a flat hand is said at most so often.
+const SAID_EVERY: Duration = Duration::from_secs(3);
+
+/// A glove that is worn.
+pub(super) struct Worn<'a> {
+    place: &'a Place<'a>,
+    source: Source,
+    hand: Hand,
+    pub person: Option<VirtualPerson>,
+    /// The newest whole pose.
+    pub angles: [f32; JOINT_COUNT],
+    newest: Instant,
+    pub started: Instant,
+}
+
+impl<'a> Worn<'a> {
+    /// Opens the glove and has the hand laid flat.
+    pub fn open(
+        place: &'a Place<'a>,
+        options: &Train,
+        tell: &Tell,
+        interrupt: &Interrupt,
+    ) -> Result<Self> {
+        let (mut source, missing) = place.open(tell, interrupt)?;
+        if missing > 0 {
+            let what = format!(
+                "the glove on {} lacks sensors, and a pose needs every joint",
+                place.name()
+            );
+            return Err(Failure::new(what, place.doctor()).into());
+        }
+        let hand = known(place, &mut source, options)?;
+        let mut worn = Self {
+            place,
+            source,
+            hand,
+            person: place.person(),
+            angles: [0.0; JOINT_COUNT],
+            newest: Instant::now(),
+            started: Instant::now(),
+        };
+        worn.lies_flat(tell, interrupt)?;
+        Ok(worn)
+    }
+
+    /// The time on the clock of the scans.
+    pub fn now(&self) -> glove::Instant {
+        self.source.now()
+    }
+
+    /// How the glove is read, in a line.
+    pub fn line(&self) -> String {
+        self.source.line()
+    }
+
+    /// The whole poses that came, waited for a moment.
+    pub fn poses(&mut self) -> Result<Vec<Pose>> {
+        let mut poses = Vec::new();
+        let mut scanned = self.source.next(ROUND)?;
+        while let Some(scan) = scanned {
+            self.newest = Instant::now();
+            let pose = self.hand.take(&scan);
+            if pose.is_whole() {
+                self.angles = pose.angles;
+                poses.push(pose);
+            }
+            scanned = self.source.next(Duration::ZERO)?;
+        }
+        if self.newest.elapsed() >= SILENT {
+            let what = format!("the glove on {} no longer sends scans", self.place.name());
+            return Err(Failure::new(what, self.place.doctor()).into());
+        }
+        if !self.hand.is_calibrated() {
+            let what = format!(
+                "the glove on {} is no longer calibrated: the sensor of the hand, or two others, started anew",
+                self.place.name()
+            );
+            return Err(Failure::new(what, self.place.doctor()).into());
+        }
+        Ok(poses)
+    }
+
+    fn lies_flat(&mut self, tell: &Tell, interrupt: &Interrupt) -> Result<()> {
+        tell.say(format_args!("{ASK_FLAT}"));
+        self.source.begin()?;
+        self.hand.begin_flat(self.source.now(), ticks(FLAT_WAIT));
+        if let Some(person) = &self.person {
+            person.ask(Step::FirstFlat);
+        }
+        let mut said = Instant::now();
+        loop {
+            match self.source.next(ROUND)? {
+                Some(scanned) => drop(self.hand.take(&scanned)),
+                None => self.hand.pass(self.source.now()),
+            }
+            match self.hand.flat() {
+                Flat::Taken => break,
+                Flat::Refused(why) => {
+                    let what = format!("the flat hand was not taken: {why}");
+                    return Err(
+                        Failure::new(what, "the same again, the hand flat and still").into(),
+                    );
+                }
+                Flat::Waiting(Some(why)) if said.elapsed() >= SAID_EVERY => {
+                    said = Instant::now();
+                    tell.say(format_args!("flat     not yet: {why}"));
+                }
+                Flat::Waiting(_) | Flat::None => {}
+            }
+            if interrupt.asked() {
+                return Err(Failure::interrupted("before anything was shown").into());
+            }
+        }
+        tell.say(format_args!("flat     taken"));
+        if let Some(person) = &self.person {
+            person.let_go();
+        }
+        self.newest = Instant::now();
+        Ok(())
+    }
+
+    /// A minute of free motion.
+    pub fn moves_freely(&mut self, json: bool, tell: &Tell, interrupt: &Interrupt) -> Result<Free> {
+        let terminal = || "the terminal does not work".to_owned();
+        let next = "the same with | cat behind it, which prints lines instead";
+        let drawn = !json && out::is_drawn();
+        let mut live = Live::start(!drawn).or_fail(terminal, next)?;
+        let mut free = Free::new(self.now());
+        let mut asked = None;
+        while !free.is_over() {
+            for pose in self.poses()? {
+                free.take(&pose.angles, pose.at);
+            }
+            free.pass(self.now());
+            if interrupt.asked() || (!json && out::closed()) {
+                return Err(Failure::interrupted("in the free motion: nothing was kept").into());
+            }
+            for key in live.keys().or_fail(terminal, next)? {
+                match key {
+                    Key::End => {
+                        return Err(
+                            Failure::interrupted("in the free motion: nothing was kept").into()
+                        );
+                    }
+                    Key::Clutch | Key::Open => free.go_on(self.now()),
+                    Key::Calibrate | Key::Again => {}
+                }
+            }
+            let Some(ask) = free.ask(self.now()) else {
+                break;
+            };
+            if !drawn && asked.replace(ask.number) != Some(ask.number) {
+                tell.say(format_args!(
+                    "{:>2} of {}   {}",
+                    ask.number, ask.of, ask.ask
+                ));
+            }
+            let view = || TeachView {
+                elapsed: self.started.elapsed(),
+                doing: Doing::Free(ask),
+                words: String::new(),
+                gripper: None,
+                axes: Vec::new(),
+                hand: self.angles,
+                said: Some((seen(&free), free.missing().is_empty())),
+                glove: self.source.line(),
+                keys: "space: the next movement   q: end",
+            };
+            if drawn {
+                live.show(view).or_fail(terminal, next)?;
+            }
+        }
+        Ok(free)
+    }
+}
+
+fn seen(free: &Free) -> String {
+    match free.missing() {
+        missing if missing.is_empty() => "every movement seen".to_owned(),
+        missing => format!("not yet: {}", names(&missing)),
+    }
+}
+
+/// How the sensors sit.
+fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand> {
+    if options.worn.ideal {
+        return Ok(Hand::ideal(side(options)));
+    }
+    let none = |why: String| {
+        let what = format!("the glove on {} is not calibrated: {why}", place.name());
+        let calibrate = place.command("calibrate").then(", and then the same again");
+        // Never for a real glove: its angles would be wrong by tens of degrees.
+        let next = match place.person() {
+            Some(_) if matches!(place, Place::Port(_)) => calibrate
+                .then("; if its sensors sit straight: ")
+                .then(NextStep::same(Command::more().word("--ideal"))),
+            _ => calibrate,
+        };
+        Failure::new(what, next)
+    };
+    let ids = source.ids();
+    if let Source::Chip { scans, address } = source {
+        let kept = scans.profile().map_err(|error| error.at(address))?;
+        let bound = kept.ok_or_else(|| none("the bridge keeps no profile of it".to_owned()))?;
+        bound
+            .fits(&ids)
+            .map_err(|misfit| none(misfit.to_string()))?;
+        return Ok(Hand::with_profile(&bound));
+    }
+    let (_, kept) = profile_of(options.worn.profile.as_deref(), &ids)?.map_err(none)?;
+    Ok(Hand::with_profile(&kept.bound))
+}

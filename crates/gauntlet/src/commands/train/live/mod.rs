@@ -1,0 +1,187 @@
+//! `gauntlet train --live`: the person with the glove on shows the poses.
+
+mod files;
+mod hand;
+mod said;
+mod session;
+mod shower;
+
+use std::time::Instant;
+
+use anyhow::Result;
+use glove::hand::Side;
+use trainer::data::read_samples;
+use trainer::hand::Space;
+
+use super::args::Train;
+use super::request;
+use crate::commands::calibrate::source::Place;
+use crate::commands::glove::GloveAt;
+use crate::commands::teleop::Hand as WhichHand;
+use crate::progress::Person;
+use crate::results::{self, maps};
+use crate::tell::Tell;
+use host::failure::{Failure, told};
+use host::interrupt::Interrupt;
+use host::next::{Command, advice};
+use host::stats::seconds;
+use host::teaching::kept::matrices;
+use host::teaching::{Aim, Learner};
+use host::training::judgement::Judgement;
+use host::training::lessons::Lessons;
+use host::training::quality::Quality;
+use host::training::{Course, PairKind};
+use session::{Session, Shown};
+use shower::Shower;
+
+/// Pairs besides the start poses where nothing else is said (§3.3.4).
+const ROUNDS: usize = 8;
+
+/// Leads a person through it.
+///
+/// # Errors
+/// A failure that names the port, the sensor or the file; where the pairs are kept, and how to go on.
+pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
+    let tell = Tell::new(options.json);
+    let aim = aim(options)?;
+    let rounds = rounds(options)?;
+    let files = files::Files::of(options, &aim)?;
+    let place = place(options)?;
+    let mut worn = hand::Worn::open(&place, options, &tell, interrupt)?;
+    let begun = Instant::now();
+    let motion = files.motion(&mut worn, options, &tell, interrupt)?;
+    // --resume names pairs here, no checkpoint.
+    let course = Course {
+        checkpoint: None,
+        resume: None,
+        ..request::course(options)
+    };
+    let mut lessons = match &aim {
+        Aim::Gripper(space) => Lessons::of_gripper(&motion, *space, course, &Person)?,
+        Aim::Samples { samples, .. } => Lessons::of_samples(&motion, samples, course, &Person)?,
+    };
+    // What begins to be learned is ready before the first pose is asked.
+    let learner = Learner::start(lessons)?;
+    let shower = (options.worn.show_on.as_deref())
+        .map(|gripper| Shower::new(gripper, options.gripper_model));
+    let mut session = Session::new(worn, learner, &aim, rounds, &files, options.json).on(shower);
+    let led = session.lead(&tell, interrupt);
+    let done = session.finish()?;
+    if led.map_err(|error| files.goes_on(error, &done.pairs))? == Shown::Stopped {
+        return Err(files.stopped(&done.pairs).into());
+    }
+    lessons = done.lessons;
+    let pairs = matrices(&done.pairs);
+    let finished = lessons.finish(pairs.clone(), &Person, interrupt)?;
+    super::files::save(&finished.model, options)?;
+    let mut warnings = finished.learned.warnings.clone();
+    let judgement = aim.space().map(|space| {
+        let quality = Quality::from_measured(&finished.measured, space);
+        Judgement::of(
+            (&finished.model, space),
+            &motion.frames(),
+            Some(&pairs),
+            quality,
+        )
+    });
+    if let Some(judgement) = &judgement {
+        warnings.extend(judgement.quality.unfit());
+    }
+    let taught = maps::Taught {
+        model: &options.out,
+        poses: files.poses(),
+        pairs_file: files.pairs(),
+        pairs: pairs.inputs.rows,
+        seed: options.seed,
+        refused: done.refused,
+        taken_back: done.taken_back,
+        next_pose_s: done.slowest.as_secs_f64(),
+        session_s: begun.elapsed().as_secs_f64(),
+        training_s: finished.learned.took.as_secs_f64(),
+        warnings: &warnings,
+        quality: match &judgement {
+            Some(judgement) => maps::Measures::Hand(&judgement.quality),
+            None => maps::Measures::Domains(&finished.measured),
+        },
+        good: judgement.as_ref().map(Judgement::good),
+        verdict: judgement.as_ref().map(ToString::to_string),
+        faults: judgement.as_ref().map(Judgement::named).unwrap_or_default(),
+        off_pairs: judgement
+            .as_ref()
+            .and_then(|judgement| judgement.pairs.as_ref())
+            .map(|pairs| pairs.off().into()),
+    };
+    if options.json {
+        return results::print("train --live", taught);
+    }
+    tell.say(format_args!(
+        "trained    in {}",
+        seconds(finished.learned.took)
+    ));
+    match &judgement {
+        Some(judgement) => said::verdict(judgement, &tell),
+        None => {
+            for line in finished.measured.lines() {
+                tell.say(format_args!("quality    {line}"));
+            }
+        }
+    }
+    tell.say(format_args!("pairs      {}", files.pairs().display()));
+    tell.say(format_args!("model      {}", options.out.display()));
+    let report = Command::gauntlet("report").path("--model", &options.out);
+    tell.say(format_args!(
+        "next       {}",
+        report.then(" draws what it does")
+    ));
+    Ok(())
+}
+
+/// What the hand will move.
+fn aim(options: &Train) -> Result<Aim> {
+    match &options.target {
+        Some(file) => Ok(Aim::Samples {
+            samples: read_samples(file, "x").map_err(told)?,
+            name: file.display().to_string(),
+        }),
+        None => Ok(Aim::Gripper(
+            Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
+        )),
+    }
+}
+
+fn rounds(options: &Train) -> Result<usize> {
+    match options.pairs {
+        None => Ok(ROUNDS),
+        Some(choice) if choice.kind == PairKind::Adaptive => Ok(choice.count.unwrap_or(ROUNDS)),
+        Some(_) => {
+            let what = "--live chooses the poses one after another";
+            Err(Failure::usage(what, "--pairs 8, or none").into())
+        }
+    }
+}
+
+fn place(options: &Train) -> Result<Place<'_>> {
+    match (&options.worn.bridge, &options.worn.glove) {
+        (Some(bridge), _) => Ok(Place::Chip(bridge)),
+        (None, Some(glove)) => Ok(Place::Port(GloveAt {
+            glove: glove.clone(),
+            profile: options.worn.profile.clone(),
+            ideal: options.worn.ideal,
+            hand: options.worn.hand,
+            json: options.json,
+        })),
+        (None, None) => Err(Failure::usage(
+            "no glove is named",
+            advice("--glove PORT; ").then(Command::gauntlet("ports").then(" lists them")),
+        )
+        .into()),
+    }
+}
+
+/// Which hand wears the glove, where no profile says.
+fn side(options: &Train) -> Side {
+    match options.worn.hand {
+        WhichHand::Right => Side::Right,
+        WhichHand::Left => Side::Left,
+    }
+}
