@@ -1,8 +1,10 @@
-//! A hand and a 3-Finger gripper as a few lines, to be told apart at a glance: schematic, not to scale.
+//! A hand and a 3-Finger gripper as a few lines, to be told apart at a glance: schematic. Where the lines are is
+//! [`glove::hand::shape`] and [`gripper::kinematics`].
 //!
 //! Colours say what moves what: thumb and finger A, index and finger B, ring and little finger and finger C.
 
-use glove::hand::{JOINT_COUNT, Side, segment_orientations};
+use glove::hand::{JOINT_COUNT, Side, shape};
+use gripper::kinematics::Model;
 
 use super::{Key, Sketch, Stroke};
 
@@ -38,14 +40,12 @@ const FRONT: View = View {
 const ACROSS: (f32, f32) = (-93.0, 121.0);
 const LOWEST: f32 = -22.0;
 
-/// First joint of each digit in the hand's frame (x to the thumb, y to the back, z to the fingertips), and lengths of its bones, mm.
-const DIGITS: [(Point, [f32; 3], Colour); 5] = [
-    ([20.0, -12.0, 25.0], [44.0, 32.0, 26.0], THUMB_A),
-    ([26.0, 0.0, 92.0], [42.0, 25.0, 20.0], INDEX_B),
-    ([5.0, 3.0, 95.0], [46.0, 29.0, 21.0], MIDDLE),
-    ([-15.0, 1.0, 88.0], [42.0, 27.0, 21.0], RING_C),
-    ([-33.0, -3.0, 79.0], [33.0, 20.0, 19.0], RING_C),
-];
+/// Colours of the digits, from the thumb on.
+const DIGITS: [Colour; 5] = [THUMB_A, INDEX_B, MIDDLE, RING_C, RING_C];
+/// Colours of the gripper's fingers A, B, C.
+const FINGERS: [Colour; 3] = [THUMB_A, INDEX_B, RING_C];
+/// The gripper is larger than a hand: it is shown at this share of its size.
+const GRIPPER: f32 = 0.8;
 
 /// What the colours mean.
 #[must_use]
@@ -60,27 +60,21 @@ pub fn key() -> Vec<Key> {
     .into()
 }
 
-/// The thumb's rest: a flat hand's thumb points aside, and bends across the palm.
-fn thumb_rest() -> glove::hand::Quaternion {
-    let aside = glove::hand::Quaternion::from_euler_angles(0.0, 0.75, 0.0);
-    let across = glove::hand::Quaternion::from_euler_angles(0.0, 0.0, -0.9);
-    aside * across
-}
-
 /// A right hand seen from the palm's side; 25 angles, radians.
 #[must_use]
 pub fn hand(angles: &[f32]) -> Sketch {
     let Ok(angles) = <[f32; JOINT_COUNT]>::try_from(angles) else {
         return Sketch::default();
     };
-    let orientations = segment_orientations(&angles, Side::Right);
+    let poses = shape::poses(&angles, Side::Right);
+    let knuckle = |finger: usize| Point::from(shape::first_joint(finger, Side::Right));
     let palm: Vec<Point> = vec![
         [18.0, 0.0, 0.0],
         [30.0, -4.0, 30.0],
-        DIGITS[1].0,
-        DIGITS[2].0,
-        DIGITS[3].0,
-        DIGITS[4].0,
+        knuckle(1),
+        knuckle(2),
+        knuckle(3),
+        knuckle(4),
         [-28.0, -4.0, 30.0],
         [-18.0, 0.0, 0.0],
     ];
@@ -89,21 +83,10 @@ pub fn hand(angles: &[f32]) -> Sketch {
         colour: SKIN,
         width: 0,
     }];
-    let rest = thumb_rest();
-    for (digit, (base, lengths, colour)) in DIGITS.into_iter().enumerate() {
-        let mut line = vec![base];
-        let mut end = base;
-        for (bone, length) in lengths.into_iter().enumerate() {
-            let segment = 1 + 3 * digit + bone;
-            let turned = if digit == 0 {
-                rest * orientations[segment]
-            } else {
-                orientations[segment]
-            };
-            let along = turned.transform_vector(&[0.0, 0.0, length].into());
-            end = [end[0] + along.x, end[1] + along.y, end[2] + along.z];
-            line.push(end);
-        }
+    for (digit, colour) in DIGITS.into_iter().enumerate() {
+        let segments = 1 + 3 * digit..4 + 3 * digit;
+        let mut line = vec![knuckle(digit)];
+        line.extend(segments.map(|k| Point::from(poses[k].at(shape::end(k, Side::Right)))));
         parts.push(Part {
             line,
             colour,
@@ -116,30 +99,29 @@ pub fn hand(angles: &[f32]) -> Sketch {
 /// The gripper seen with finger A behind; 4 counts.
 #[must_use]
 pub fn gripper(counts: &[f32]) -> Sketch {
-    let Ok([a, b, c, scissor]) = <[f32; gripper::space::AXES]>::try_from(counts) else {
+    let model = Model::ThreeFinger;
+    let Some(poses) = model.poses(counts) else {
         return Sketch::default();
     };
-    let (wide, deep, low) = (50.0, 38.0, 4.0);
+    let (wide, deep, low, high) = (50.0, 55.0, 4.0, 34.0);
     let top: Vec<Point> = vec![
-        [-wide, -deep, 30.0],
-        [wide, -deep, 30.0],
-        [wide, deep, 30.0],
-        [-wide, deep, 30.0],
+        [-wide, -deep, high],
+        [wide, -deep, high],
+        [wide, deep, high],
+        [-wide, deep, high],
     ];
     let front: Vec<Point> = vec![
-        [-wide, -deep, 30.0],
-        [wide, -deep, 30.0],
+        [-wide, -deep, high],
+        [wide, -deep, high],
         [0.8 * wide, -0.8 * deep, low],
         [-0.8 * wide, -0.8 * deep, low],
     ];
     let side: Vec<Point> = vec![
-        [-wide, -deep, 30.0],
-        [-wide, deep, 30.0],
+        [-wide, -deep, high],
+        [-wide, deep, high],
         [-0.8 * wide, 0.8 * deep, low],
         [-0.8 * wide, -0.8 * deep, low],
     ];
-    // Counts 0: fingers B and C widest apart, 16° each; 255: their tips meet.
-    let aside = 0.28 * (1.0 - 2.0 * scissor / 255.0);
     let mut parts = vec![
         Part {
             line: side,
@@ -157,36 +139,23 @@ pub fn gripper(counts: &[f32]) -> Sketch {
             width: 0,
         },
     ];
-    parts.push(finger([0.0, 34.0, 30.0], [0.0, -1.0], a, THUMB_A));
-    let towards = |side: f32| [side * libm::sinf(aside), libm::cosf(aside)];
-    parts.push(finger([34.0, -28.0, 30.0], towards(-1.0), b, INDEX_B));
-    parts.push(finger([-34.0, -28.0, 30.0], towards(1.0), c, RING_C));
+    let ends: Vec<Point> = poses
+        .iter()
+        .zip(model.links())
+        .map(|(pose, link)| pose.at(link.end))
+        .collect();
+    // Behind the palm come base, proximal, middle and distal link of each finger.
+    for (line, colour) in ends[1..].chunks(4).zip(FINGERS) {
+        parts.push(Part {
+            line: line.to_vec(),
+            colour,
+            width: 8,
+        });
+    }
+    for point in parts.iter_mut().flat_map(|part| &mut part.line) {
+        *point = point.map(|c| GRIPPER * c);
+    }
     sketch(parts, FRONT)
-}
-
-/// Three links that bend towards `inwards` (x and y) as the count grows.
-fn finger(base: Point, inwards: [f32; 2], count: f32, colour: Colour) -> Part {
-    const LINKS: [(f32, f32, f32); 3] =
-        [(58.0, -0.35, 1.10), (40.0, 0.15, 0.95), (26.0, 0.10, 0.55)];
-    let closed = (count / 255.0).clamp(-0.1, 1.1);
-    let mut line = vec![base];
-    let mut angle = 0.0;
-    let mut end = base;
-    for (length, open, bend) in LINKS {
-        angle += open + bend * closed;
-        let (aside, up) = (length * libm::sinf(angle), length * libm::cosf(angle));
-        end = [
-            end[0] + inwards[0] * aside,
-            end[1] + inwards[1] * aside,
-            end[2] + up,
-        ];
-        line.push(end);
-    }
-    Part {
-        line,
-        colour,
-        width: 8,
-    }
 }
 
 struct Part {

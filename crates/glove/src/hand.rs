@@ -14,6 +14,7 @@ pub mod beyond;
 mod calibration;
 pub mod flat;
 pub(crate) mod rotation;
+pub mod shape;
 
 pub use calibration::Calibration;
 

@@ -8,6 +8,7 @@
 //! | [`timing`] | every time of the link and the sum behind it |
 //! | [`registers`] | every field of the command and status blocks as types; faults in words |
 //! | [`driver`] | grippers as split-phase state machines behind the [`Gripper`] trait |
+//! | [`kinematics`] | where the links are, for pictures |
 //! | [`space`] | where the four axes may be without the fingers meeting |
 //! | [`travel`] | whether an axis can have moved as far as its position says |
 //!
@@ -19,6 +20,7 @@
 
 pub mod assurance;
 pub mod driver;
+pub mod kinematics;
 pub mod link;
 pub mod registers;
 pub mod rtu;
