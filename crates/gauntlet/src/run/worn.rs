@@ -2,6 +2,7 @@
 
 use bridge::Duration;
 use glove::calibration::{Bound, Step};
+use glove::hand::Side;
 
 use super::Run;
 use crate::wearer::Listener;
@@ -11,12 +12,20 @@ impl Run {
     /// The glove's sensors do not sit straight: by `profile` they sit, if there is one.
     pub fn wears(&mut self, profile: Option<Bound>) {
         self.straight = false;
+        if let Some(bound) = &profile {
+            self.side = bound.profile.side;
+        }
         self.session.set_profile(profile);
     }
 
     /// Whether the glove's sensors sit straight and share a heading; else the bridge knows how they sit, or nobody does.
     pub fn is_straight(&mut self, straight: bool) {
         self.straight = straight;
+    }
+
+    /// Which hand wears the glove, where no profile says.
+    pub fn is_hand(&mut self, side: Side) {
+        self.side = side;
     }
 
     /// Who lies flat when that is asked for.

@@ -75,6 +75,8 @@ pub struct Outcome {
     pub epochs: usize,
     /// Reference pairs used.
     pub pairs: usize,
+    /// Where they lie in the gripper's space, counts, in the order in which they were shown.
+    pub references: Matrix,
 }
 
 /// Trains with adaptive pairs and the usual cost.
@@ -107,12 +109,17 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
     };
     let mut model = task.model(&course, &learned);
     let measured = task.measure(&mut model, interrupt)?;
+    let mut references = Matrix::default();
+    for target in learned.trained.pairs.targets.iter_rows() {
+        references.push(&model.x.invert(target));
+    }
     Ok(Outcome {
         quality: Quality::from_measured(&measured, request.space),
         model,
         took: learned.took,
         epochs: learned.trained.epochs,
         pairs: learned.trained.pairs.inputs.rows,
+        references,
     })
 }
 

@@ -7,6 +7,7 @@ use glove::hand::Side;
 
 use crate::commands::glove::GloveAt;
 use crate::commands::teleop::Hand as WhichHand;
+use crate::web::ViewOptions;
 use host::chip::link::Address;
 
 /// Options of `calibrate`.
@@ -53,6 +54,9 @@ pub struct Calibrate {
     /// List the profiles that are there; no glove is needed.
     #[arg(long)]
     pub list: bool,
+    /// The page.
+    #[command(flatten)]
+    pub view: ViewOptions,
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
