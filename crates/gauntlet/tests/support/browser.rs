@@ -2,12 +2,13 @@
 
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
-use std::process::{Child, Command, Stdio};
+use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tungstenite::{Message, WebSocket};
 
+use super::bench::Running;
 use super::page::PATIENCE;
 
 /// Names under which it is installed.
@@ -15,7 +16,7 @@ const PROGRAMS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 
 /// A browser with one page, ended with the test.
 pub struct Browser {
-    child: Child,
+    _child: Running,
     socket: WebSocket<TcpStream>,
     calls: u64,
     /// What it said without being asked, oldest first.
@@ -40,7 +41,8 @@ impl Browser {
 
     fn of(program: &str) -> Self {
         let profile = tempfile::tempdir().unwrap();
-        let mut child = Command::new(program)
+        let mut command = Command::new(program);
+        command
             // As root there is no sandbox, and the page is ours.
             .args(["--headless=new", "--no-sandbox", "--disable-gpu"])
             .args(["--remote-debugging-port=0", "--disable-dev-shm-usage"])
@@ -49,10 +51,10 @@ impl Browser {
             .arg("about:blank")
             .stdin(Stdio::null())
             .stdout(Stdio::null())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut said = BufReader::new(child.stderr.take().unwrap());
+            .stderr(Stdio::piped());
+        // Ended with the test, wherever that fails.
+        let mut child = Running::start(&mut command);
+        let mut said = BufReader::new(child.0.stderr.take().unwrap());
         let mut line = String::new();
         let marker = "DevTools listening on ws://";
         while !line.contains(marker) {
@@ -68,7 +70,7 @@ impl Browser {
         stream.set_read_timeout(Some(PATIENCE)).unwrap();
         let (socket, _) = tungstenite::client(url, stream).unwrap();
         let mut browser = Self {
-            child,
+            _child: child,
             socket,
             calls: 0,
             events: Vec::new(),
@@ -213,13 +215,6 @@ impl Browser {
                 _ => event["params"]["request"]["url"].as_str(),
             })
             .collect()
-    }
-}
-
-impl Drop for Browser {
-    fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
     }
 }
 

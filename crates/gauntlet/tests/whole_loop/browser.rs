@@ -13,6 +13,10 @@ use gripper::kinematics::Model;
 use support::browser::Browser;
 use support::page::PATIENCE;
 
+/// Whether the page says that the clutch may be closed.
+const OPEN: &str =
+    "document.getElementById('clutch-words').textContent === 'clutch open: hold space'";
+
 /// A hand bent by so much, and a gripper that is nearly there.
 pub fn picture(bent: f32) -> Picture {
     let mut angles = [0.0; JOINT_COUNT];
@@ -193,12 +197,7 @@ fn a_browser_draws_what_it_is_told_fetches_nothing_else_and_says_what_a_person_d
     shown(&mut browser, &mut page, words, closed);
     browser.key(false, " ", "Space", 32);
     heard(&mut page, &Wish::Open, closed);
-    shown(
-        &mut browser,
-        &mut page,
-        "!document.getElementById('clutch').disabled",
-        || picture(0.1),
-    );
+    shown(&mut browser, &mut page, OPEN, || picture(0.1));
     browser.point("mousePressed", "clutch");
     let wishes = heard(&mut page, &Wish::Beat, || picture(0.1));
     assert_eq!(wishes[0], Wish::Close, "{wishes:?}");
@@ -207,12 +206,7 @@ fn a_browser_draws_what_it_is_told_fetches_nothing_else_and_says_what_a_person_d
     // What is held down while the clutch is said to be open closes nothing for long.
     browser.key(true, " ", "Space", 32);
     heard(&mut page, &Wish::Close, || picture(0.1));
-    shown(
-        &mut browser,
-        &mut page,
-        "document.getElementById('clutch-words').textContent === 'clutch open: hold space'",
-        || picture(0.1),
-    );
+    shown(&mut browser, &mut page, OPEN, || picture(0.1));
     browser.key(false, " ", "Space", 32);
     // An action, and Escape.
     browser.key(true, "c", "KeyC", 67);

@@ -100,14 +100,14 @@ export class Stage {
   }
 
   // `solid`: drawn whole; `ghost`: its outline, behind; `marks`: sensors; `names`: letters beside points.
-  draw({ solid = [], ghost = [], ghostColor = "#F0E442", marks = [], names = [], faded = false, theme }) {
+  draw({ solid = [], ghost = [], marks = [], names = [], faded = false, theme }) {
     this.fit();
     const context = this.context;
     context.clearRect(0, 0, this.canvas.width, this.canvas.height);
     context.globalAlpha = 1;
     this.ground(theme);
     this.shadow(solid, theme);
-    if (ghost.length) this.outline(ghost, ghostColor);
+    if (ghost.length) this.outline(ghost, theme.ghost);
     const bars = solid.filter((link) => link.every((v) => v !== null)).map((link) => this.bar(link));
     const parts = bars.filter((bar) => bar.code !== PALM);
     const palm = bars.filter((bar) => bar.code === PALM);

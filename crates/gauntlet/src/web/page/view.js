@@ -11,8 +11,8 @@ const BEAT = 100; // ms between two heartbeats: the bridge holds after 250
 const ANSWER = 700; // ms for the program to say that this page holds the clutch
 const MINUTE = 60;
 const THEMES = {
-  dark: { skin: [214, 209, 202], metal: [128, 137, 150], haze: [23, 28, 37], seam: "rgb(8 10 14 / 0.5)", floor: "rgb(120 145 180 / 0.16)", ring: "rgb(160 180 205 / 0.13)", shadow: "rgb(0 0 0 / 0.75)" },
-  light: { skin: [226, 215, 203], metal: [142, 150, 162], haze: [236, 239, 243], seam: "rgb(40 48 60 / 0.4)", floor: "rgb(90 110 140 / 0.14)", ring: "rgb(60 80 110 / 0.16)", shadow: "rgb(30 40 60 / 0.45)" },
+  dark: { skin: [214, 209, 202], metal: [128, 137, 150], haze: [23, 28, 37], seam: "rgb(8 10 14 / 0.5)", floor: "rgb(120 145 180 / 0.16)", ring: "rgb(160 180 205 / 0.13)", shadow: "rgb(0 0 0 / 0.75)", ghost: "#F0E442" },
+  light: { skin: [226, 215, 203], metal: [142, 150, 162], haze: [236, 239, 243], seam: "rgb(40 48 60 / 0.4)", floor: "rgb(90 110 140 / 0.14)", ring: "rgb(60 80 110 / 0.16)", shadow: "rgb(30 40 60 / 0.45)", ghost: "#0072B2" },
 };
 
 const HOLD = TOUCH ? "the button" : "space";
@@ -476,7 +476,6 @@ function guide() {
 
 function faults() {
   const well = !picture.faults.length;
-  $("faults-panel").classList.toggle("wide", !well);
   list("faults", well ? ["nothing: all is well"] : picture.faults);
   $("faults").firstElementChild.classList.toggle("well", well);
   const key = JSON.stringify(picture.actions);
