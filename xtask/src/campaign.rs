@@ -32,6 +32,21 @@ pub fn glove() -> Result<(), Failure> {
     )
 }
 
+/// What a page at 60 pictures a second costs the loop, and an hour of it.
+pub fn view() -> Result<(), Failure> {
+    let test = [
+        "test",
+        "--locked",
+        "--package",
+        "gauntlet",
+        "--test",
+        "whole_loop",
+        "--",
+    ];
+    let only = ["--ignored", "--nocapture", "a_page_costs_the_loop"];
+    step::run("the page's cost", cargo(&test).args(only))
+}
+
 /// The ignored tests of one file, one after another.
 fn ignored(title: &'static str, package: &str, test: &str) -> Result<(), Failure> {
     step::run(

@@ -1,4 +1,5 @@
-//! One entry for the project's chores: `cargo xtask setup | test | firmware | qemu | powercut | same-bits | bench | figures | campaign | fuzz | docs`.
+//! One entry for the project's chores: `cargo xtask setup | test | firmware | qemu | powercut | same-bits | bench | figures | campaign | fuzz |
+//! pictures | docs`.
 //!
 //! The chores only start other programs (cargo, rustup, apt-get, qemu); what they check lives in the crates.
 
@@ -8,6 +9,7 @@ mod elf;
 mod figures;
 mod firmware;
 mod fuzz;
+mod pictures;
 mod setup;
 mod skips;
 mod step;
@@ -40,8 +42,11 @@ chores:
   campaign glove      virtual persons in honest gloves: errors of ten minutes, what the checks find; minutes
   campaign teaching   live trainings by the virtual person in honest gloves, killed and gone on; minutes
   campaign stalls     processes that stand still in motion, on the PC and in QEMU; minutes
+  campaign view       what a page costs the loop (five pairs of runs), an hour's soak; on a quiet machine
   fuzz [--short]      the fuzz targets under cargo-fuzz, 10 minutes each (30 s with --short); where
                       there is no nightly compiler, on stable
+  pictures            make the README's picture of the page from a demo in a browser without a screen, and
+                      pictures of the page's every state into target/pictures, to look at; needs chromium
   docs                build the documentation, warnings are errors
 
 options of test:
@@ -75,8 +80,10 @@ fn main() -> ExitCode {
         ["campaign", "glove"] => campaign::glove(),
         ["campaign", "teaching"] => campaign::teaching(),
         ["campaign", "stalls"] => campaign::stalls(),
+        ["campaign", "view"] => campaign::view(),
         ["fuzz"] => fuzz::run(fuzz::Length::Long),
         ["fuzz", "--short"] => fuzz::run(fuzz::Length::Short),
+        ["pictures"] => pictures::run(),
         ["docs"] => test::docs(),
         ["help" | "--help" | "-h"] => {
             println!("{USAGE}");

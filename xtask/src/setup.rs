@@ -21,6 +21,8 @@ const PEERS: [&str; 7] = [
     "mcap-ros2-support==0.6.0",
     "foxglove-schemas-protobuf==0.4.0",
 ];
+/// Names under which a browser that the tests can drive is installed.
+const BROWSERS: [&str; 3] = ["chromium", "chromium-browser", "google-chrome"];
 const PEERS_PYTHON: &str = "GAUNTLET_PEERS_PYTHON";
 
 /// A thing that a chore needs.
@@ -34,6 +36,8 @@ pub enum Thing {
     PeersPython,
     /// A Modbus program in C, from Debian.
     PeersMbpoll,
+    /// A browser, for the tests of the page.
+    Browser,
     /// The compiler that fuzzing needs.
     Nightly,
     /// cargo-fuzz.
@@ -41,11 +45,12 @@ pub enum Thing {
 }
 
 /// What the tests use.
-const TESTS: [Thing; 4] = [
+const TESTS: [Thing; 5] = [
     Thing::Target,
     Thing::Emulator,
     Thing::PeersPython,
     Thing::PeersMbpoll,
+    Thing::Browser,
 ];
 
 /// Command lines that together install a thing; another way is tried where one of them fails.
@@ -58,6 +63,7 @@ impl Thing {
             Self::Emulator => "qemu-system-arm",
             Self::PeersPython => "Python's Modbus and MCAP packages (peers in the tests)",
             Self::PeersMbpoll => "mbpoll (a peer in the tests)",
+            Self::Browser => "chromium (the page in the tests)",
             Self::Nightly => "a nightly compiler",
             Self::CargoFuzz => "cargo-fuzz",
         }
@@ -70,6 +76,9 @@ impl Thing {
             Self::PeersPython => peers_python().is_some(),
             // It has no option that ends well; that it starts is enough.
             Self::PeersMbpoll => Command::new("mbpoll").arg("-V").output().is_ok(),
+            Self::Browser => BROWSERS
+                .iter()
+                .any(|program| step::succeeds(Command::new(program).arg("--version"))),
             Self::Nightly => step::succeeds(&mut fuzz::nightly(&["--version"])),
             Self::CargoFuzz => step::succeeds(&mut fuzz::nightly(&["fuzz", "--version"])),
         }
@@ -77,7 +86,7 @@ impl Thing {
 
     /// Without a peer the tests say that they skip it.
     fn is_optional(self) -> bool {
-        matches!(self, Self::PeersPython | Self::PeersMbpoll)
+        matches!(self, Self::PeersPython | Self::PeersMbpoll | Self::Browser)
     }
 
     fn ways(self) -> Vec<Way> {
@@ -94,6 +103,7 @@ impl Thing {
             ],
             Self::Emulator => vec![apt(EMULATOR)],
             Self::PeersMbpoll => vec![apt("mbpoll")],
+            Self::Browser => vec![apt("chromium")],
             Self::PeersPython => {
                 let folder = peers_folder().display().to_string();
                 let make = ["python3", "-m", "venv", &folder].map(str::to_owned);

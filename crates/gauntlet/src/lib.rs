@@ -8,6 +8,7 @@
 //! | [`reading`], [`outputs`], [`played`] | files that are read, files that may be written over, motion that is played |
 //! | [`wearer`] | the virtual person in an honest virtual glove, calibrated on the virtual clock |
 //! | [`run`], [`live`] | a run as a person sees it, of a bridge in this process or on a chip |
+//! | [`web`] | a page in a browser that shows them |
 //!
 //! Everything that another program could use is in [`host`].
 
@@ -26,3 +27,4 @@ pub mod results;
 pub mod run;
 pub mod tell;
 pub mod wearer;
+pub mod web;

@@ -3,6 +3,8 @@
 mod bringup;
 mod clutch;
 mod finished;
+mod on_page;
+mod paged;
 mod shown;
 mod view;
 mod worn;
@@ -13,6 +15,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use bridge::event::Kind;
+use glove::hand::Side;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::live::{Key, Live};
@@ -26,10 +29,12 @@ use host::recording::{Drawn, QUEUE, SessionLog};
 use host::session::record::{self, Feed, Records, Sort};
 use host::session::{Devices, Driver, Ending, Order, Session, Snapshot};
 use host::settings::Settings;
+use on_page::OnPage;
 use shown::Shown;
 
 pub use bringup::{ASK as ASK_FLAT, WAIT as FLAT_WAIT};
 pub use finished::Finished;
+pub use on_page::drawn;
 
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);
@@ -41,7 +46,7 @@ const FILE_LIMIT_TOLD: Duration = Duration::from_millis(300);
 const SUSPEND_HOLD: Duration = Duration::from_millis(500);
 
 /// How a run goes.
-#[derive(Debug)]
+#[derive(Debug, Clone, Copy)]
 pub struct Options {
     /// Heading of the view.
     pub title: &'static str,
@@ -117,6 +122,12 @@ pub struct Run {
     person: Option<Listener>,
     /// It was asked to by a key: calibrations that had ended by then.
     asked_flat: Option<u16>,
+    /// Which hand wears the glove.
+    side: Side,
+    /// The page in a browser.
+    page: Option<OnPage>,
+    /// How it is driven, and since when, once it is.
+    course: Option<(Options, Instant)>,
 }
 
 impl Run {
@@ -148,6 +159,9 @@ impl Run {
             finds_flat: true,
             person: None,
             asked_flat: None,
+            side: Side::Right,
+            page: None,
+            course: None,
         }
     }
 
@@ -259,6 +273,7 @@ impl Run {
         }
         let started = Instant::now();
         self.session.hub().begin();
+        self.course = Some((*options, started));
         loop {
             // Nobody sees the view: as if nobody were there.
             self.unseen = live.unseen();
@@ -267,7 +282,8 @@ impl Run {
                 self.obey(key, options);
             }
             let keys = live.interactive();
-            self.attended = keys;
+            let attended = keys || self.has_pages();
+            self.attended = attended;
             live.show(|| self.view(options, started.elapsed(), keys))
                 .or_fail(terminal, next)?;
             self.note_log_end(options.quiet);
@@ -283,11 +299,11 @@ impl Run {
                 .seconds
                 .is_some_and(|time| started.elapsed() >= time);
             // Nobody is there to close the clutch again.
-            let useless = options.engage && self.clutch.too_late && !keys;
+            let useless = options.engage && self.clutch.too_late && !attended;
             if over || useless {
                 return Ok(End::Time);
             }
-            self.interrupt.sleep(ROUND);
+            self.interrupt.sleep(self.pause());
         }
     }
 
@@ -382,7 +398,7 @@ impl Run {
             .clutch
             .heartbeat
             .is_none_or(|last| now.duration_since(last) >= HEARTBEAT - ROUND / 2);
-        if self.clutch.closed && due && !self.unseen {
+        if self.clutch.is_kept_here() && due && !self.unseen {
             self.clutch.heartbeat = Some(now);
             // What is not taken is given again with the next.
             self.session.order(Order::Heartbeat);
@@ -392,6 +408,7 @@ impl Run {
         self.look_at_file_limit();
         self.look_at_events();
         self.look_at_flat();
+        self.look_at_page();
         Ok(())
     }
 

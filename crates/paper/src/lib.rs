@@ -6,7 +6,7 @@ pub mod fold;
 pub mod hands;
 mod laboratory;
 pub mod plan;
-mod principal;
+pub mod principal;
 pub mod printed;
 pub mod shapes;
 pub mod stats;

@@ -3,6 +3,8 @@
 use std::time::{Duration, Instant};
 
 use bridge::clutch::Position;
+
+use crate::web::PageId;
 use host::session::{Order, Orders, Session};
 
 /// After this long the bridge has seen that the clutch was closed, on a line that loses most of what is said, too.
@@ -26,6 +28,8 @@ pub(super) struct Clutch {
     /// The order to open it was not taken yet.
     release_due: bool,
     pub heartbeat: Option<Instant>,
+    /// The page on which a person holds it closed, or held it when it opened by itself; else a key or an option closed it.
+    page: Option<PageId>,
 }
 
 impl Clutch {
@@ -40,19 +44,66 @@ impl Clutch {
             self.release_due = !orders.give(Order::Release);
         }
     }
+
     /// Closes it: an act of a person.
     pub fn engage(&mut self, session: &dyn Session) {
+        self.close(session, None);
+    }
+
+    /// Closes it for a person who holds it on `page`. Nothing where somebody else has closed it: one holds it.
+    pub fn hold(&mut self, session: &dyn Session, page: PageId) {
+        if !self.closed {
+            self.close(session, Some(page));
+        }
+    }
+
+    fn close(&mut self, session: &dyn Session, page: Option<PageId>) {
         let now = Some(Instant::now());
         *self = Self {
             closed: true,
             engaged: now,
             heartbeat: now,
             late_before: session.orders().too_late(),
+            page,
             ..Self::default()
         };
         if !session.order(Order::Engage) {
             // It would be too old once there is room.
             (self.closed, self.too_late) = (false, true);
+        }
+    }
+
+    /// The page that holds it closed now.
+    pub fn page(&self) -> Option<PageId> {
+        self.page.filter(|_| self.closed)
+    }
+
+    /// Whether a key or an option closed it: then this program keeps it closed by itself.
+    pub fn is_kept_here(&self) -> bool {
+        self.closed && self.page.is_none()
+    }
+
+    /// Why it opened by itself, in words.
+    pub fn why_expired(&self) -> Option<&'static str> {
+        self.expired.then_some(match self.page {
+            Some(_) => "the clutch opened by itself: the page that held it was not heard for 1 s",
+            None => "the clutch opened by itself: nobody kept it closed for 1 s",
+        })
+    }
+
+    /// A heartbeat of the person on `page`, who still holds it. Of another page it is none.
+    pub fn beat(&mut self, session: &dyn Session, page: PageId) {
+        if self.page() == Some(page) {
+            self.heartbeat = Some(Instant::now());
+            // What is not taken is given again with the next.
+            session.order(Order::Heartbeat);
+        }
+    }
+
+    /// `page` was closed: nobody holds there what it held.
+    pub fn gone(&mut self, orders: &Orders, page: PageId) {
+        if self.page() == Some(page) {
+            self.release(orders);
         }
     }
 

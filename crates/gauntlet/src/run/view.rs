@@ -42,6 +42,9 @@ impl Run {
             gripper_faults: progress.gripper_faults,
             keys: key_words(keys, options.drives),
         };
+        if let Some(address) = self.page_address() {
+            view.keys = format!("{}   page: {address}", view.keys);
+        }
         if let Some(snapshot) = &snapshot {
             view.state = self.state_words(snapshot, keys && options.drives);
             view.following = snapshot.state.is_moving();
@@ -95,9 +98,7 @@ impl Run {
             }
         }
         faults.extend(self.log_end());
-        if self.clutch.expired {
-            faults.push("the clutch opened by itself: nobody kept it closed for 1 s".to_owned());
-        }
+        faults.extend(self.clutch.why_expired().map(str::to_owned));
         if self.clutch.too_late {
             faults.push(CLOSED_TOO_LATE.to_owned());
         }

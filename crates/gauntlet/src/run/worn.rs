@@ -3,6 +3,7 @@
 use anyhow::Result;
 use bridge::Duration;
 use glove::calibration::{Bound, Step};
+use glove::hand::Side;
 
 use super::Run;
 use crate::wearer::Listener;
@@ -12,8 +13,11 @@ impl Run {
     /// The glove's sensors do not sit straight: by `profile` they sit, if there is one.
     pub fn wears(&mut self, profile: Option<Bound>) {
         self.straight = false;
-        if let (Some(bound), Some(to)) = (&profile, &mut self.log_to) {
-            to.drawn.side = bound.profile.side;
+        if let Some(bound) = &profile {
+            self.side = bound.profile.side;
+            if let Some(to) = &mut self.log_to {
+                to.drawn.side = bound.profile.side;
+            }
         }
         self.session.set_profile(profile);
     }
@@ -30,6 +34,11 @@ impl Run {
     pub fn finds_flat(&mut self, finds: bool) -> Result<()> {
         self.finds_flat = finds;
         self.order(Order::FindFlat(finds))
+    }
+
+    /// Which hand wears the glove, where no profile says.
+    pub fn is_hand(&mut self, side: Side) {
+        self.side = side;
     }
 
     /// Who lies flat when that is asked for.

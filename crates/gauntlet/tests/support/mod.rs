@@ -8,9 +8,11 @@ use std::sync::OnceLock;
 use std::time::{Duration, Instant, UNIX_EPOCH};
 
 pub mod bench;
+pub mod browser;
 pub mod devices;
 pub mod lines;
 pub mod other_master;
+pub mod page;
 pub mod samples;
 pub mod terminal;
 pub mod told;

@@ -7,6 +7,7 @@ mod debugger;
 #[path = "../support/mod.rs"]
 mod support;
 
+mod browser;
 mod chip_judged;
 mod demo;
 mod devices;
@@ -14,5 +15,6 @@ mod ends;
 mod ends_judged;
 mod every_gripper;
 mod own_faults;
+mod page;
 mod stalls;
 mod view;

@@ -84,6 +84,8 @@ pub struct Outcome {
     pub pairs: usize,
     /// All starts; the one in the running is taken.
     pub starts: Vec<Start>,
+    /// Where they lie in the gripper's space, counts, in the order in which they were shown.
+    pub references: Matrix,
 }
 
 /// Trains with adaptive pairs and the usual cost.
@@ -116,6 +118,10 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
     };
     let mut model = task.model(&course, &learned);
     let measured = task.measure(&mut model, interrupt)?;
+    let mut references = Matrix::default();
+    for target in learned.trained.pairs.targets.iter_rows() {
+        references.push(&model.x.invert(target));
+    }
     Ok(Outcome {
         quality: Quality::from_measured(&measured, request.space),
         model,
@@ -123,6 +129,7 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
         starts: learned.starts,
         epochs: learned.trained.epochs,
         pairs: learned.trained.pairs.inputs.rows,
+        references,
     })
 }
 

@@ -7,6 +7,7 @@ use anyhow::Result;
 use clap::{Args, Subcommand};
 
 use crate::options::run_time;
+use crate::web::ViewOptions;
 use host::chip::link::{Address, Error, HostLink};
 use host::next::Command;
 use host::session::Devices;
@@ -55,6 +56,9 @@ pub enum BridgeVerb {
         /// End by itself after this many seconds (1 to 86400).
         #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
+        /// The page.
+        #[command(flatten)]
+        view: ViewOptions,
     },
     /// Take the flat and still hand: it gives the headings of a glove whose profile the bridge keeps. One that is not calibrated
     /// does not drive.
@@ -89,6 +93,9 @@ pub enum BridgeVerb {
         /// End by itself after this many seconds (1 to 86400).
         #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
         seconds: Option<Duration>,
+        /// The page.
+        #[command(flatten)]
+        view: ViewOptions,
     },
     /// Write the hand's joint angles, 20 a second, into a poses file that `train` takes.
     Log {

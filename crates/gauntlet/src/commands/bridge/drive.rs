@@ -10,6 +10,7 @@ use super::args::BridgeAt;
 use crate::results::{self, runs};
 use crate::run::{Finished, Options, Run};
 use crate::tell::Tell;
+use crate::web::{Page, ViewOptions};
 use host::chip::link::HostLink;
 use host::clock::Clock;
 use host::interrupt::Interrupt;
@@ -27,16 +28,18 @@ pub(super) fn engage(
     at: &BridgeAt,
     flat: Option<Flat>,
     activate: bool,
-    seconds: Option<Duration>,
+    (seconds, view): (Option<Duration>, &ViewOptions),
     interrupt: &Interrupt,
 ) -> Result<()> {
     let tell = Tell::new(at.json);
     // Whose keys are not known is refused before anything moves.
     Settings::load()?;
+    let page = Page::start(view, &tell)?;
     let mut link = at.connect()?;
     // An older bridge is refused before anything moves.
     at.told(link.health())?;
     let mut run = start(link, None, at.devices(), interrupt)?;
+    run.shows(page, None);
     let ready = ready(&mut run, flat, activate, &tell);
     let began = matches!(ready, Ok(true));
     let driven = ready.and_then(|ready| match ready {

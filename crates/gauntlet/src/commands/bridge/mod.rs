@@ -39,9 +39,10 @@ pub(crate) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
             ideal,
             activate,
             seconds,
+            view,
         } => {
             let flat = calibrate_flat.then_some(drive::Flat { ideal: *ideal });
-            drive::engage(at, flat, *activate, *seconds, interrupt)
+            drive::engage(at, flat, *activate, (*seconds, view), interrupt)
         }
         BridgeVerb::Calibrate { at, undo: true, .. } => calibrate::undo(at),
         BridgeVerb::Calibrate {
@@ -54,7 +55,9 @@ pub(crate) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
             calibrate::calibrate(at, profile.as_deref(), flat, interrupt)
         }
         BridgeVerb::Release { at } => release(at),
-        BridgeVerb::Monitor { at, seconds } => watch::monitor(at, *seconds, interrupt),
+        BridgeVerb::Monitor { at, seconds, view } => {
+            watch::monitor(at, (*seconds, view), interrupt)
+        }
         BridgeVerb::Log { at, out, seconds } => watch::log(at, out, *seconds, interrupt),
         BridgeVerb::Select { slot, at } => select(at, *slot),
         BridgeVerb::Reboot { at } => reboot(at),

@@ -11,16 +11,19 @@ use super::poses;
 use crate::outputs;
 use crate::results::runs;
 use crate::tell::Tell;
+use crate::web::{Page, ViewOptions};
 use host::failure::with_others;
 use host::interrupt::Interrupt;
 use host::recording::poses::PosesFile;
 
 pub(super) fn monitor(
     at: &BridgeAt,
-    seconds: Option<Duration>,
+    (seconds, view): (Option<Duration>, &ViewOptions),
     interrupt: &Interrupt,
 ) -> Result<()> {
+    let page = Page::start(view, &Tell::new(at.json))?;
     let mut run = start(at.connect()?, None, at.devices(), interrupt)?;
+    run.shows(page, None);
     let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
     finish("bridge monitor", at, run.finish(), (None, Ok(())), driven)
 }

@@ -8,6 +8,7 @@ use glove::hand::Side;
 use crate::commands::glove::GloveAt;
 use crate::commands::teleop::Hand as WhichHand;
 use crate::options::ReadingOptions;
+use crate::web::ViewOptions;
 use host::chip::link::Address;
 
 /// Options of `calibrate`.
@@ -57,6 +58,9 @@ pub struct Calibrate {
     /// How the glove is read.
     #[command(flatten)]
     pub reading: ReadingOptions,
+    /// The page.
+    #[command(flatten)]
+    pub view: ViewOptions,
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,

@@ -3,6 +3,7 @@
 mod args;
 mod flat;
 mod list;
+mod paged;
 pub(in crate::commands) mod session;
 pub(in crate::commands) mod source;
 mod verdict;
@@ -20,6 +21,7 @@ use crate::outputs::{self, Kind};
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
 use crate::wearer::Listener;
+use crate::web::Page;
 pub use args::Calibrate;
 use host::calibration::guide::Finding;
 use host::calibration::{Judged, ProfileStore};
@@ -93,6 +95,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
     if let Some(out) = &options.out {
         outputs::check(out, Kind::Profile, &[])?;
     }
+    let page = Page::start(&options.view, &tell)?;
     let (source, missing) = place.open(&tell, interrupt)?;
     if missing > 0 {
         let what = format!(
@@ -110,6 +113,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
     };
     let person = place.person().map(Listener::There);
     let mut session = Session::new(source, leading, person);
+    session.shows(page);
     let led = session.lead(&tell, interrupt);
     let mut done = session.finish();
     let link = done.link.take();

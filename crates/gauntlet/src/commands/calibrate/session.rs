@@ -14,6 +14,7 @@ use crate::results::calibrations::Repeated;
 use crate::results::gloves;
 use crate::tell::Tell;
 use crate::wearer::Listener;
+use crate::web::Page;
 use host::calibration::guide::{News, PARTS, Remark, Stage, plan};
 use host::calibration::{Guide, Judged};
 use host::chip::link::{Error, HostLink};
@@ -70,6 +71,7 @@ pub(in crate::commands) struct Session {
     again: Vec<Repeated>,
     started: Instant,
     said: Option<(String, Instant)>,
+    pub(super) page: Option<Page>,
 }
 
 impl Session {
@@ -84,7 +86,13 @@ impl Session {
             again: Vec::new(),
             started: Instant::now(),
             said: None,
+            page: None,
         }
+    }
+
+    /// Shows all of it on `page`, too, whose buttons are keys.
+    pub fn shows(&mut self, page: Option<Page>) {
+        self.page = page;
     }
 
     /// Leads the person through it.
@@ -117,7 +125,9 @@ impl Session {
             if interrupt.asked() || (!self.json && out::closed()) {
                 return Ok(Led::Stopped);
             }
-            for key in live.keys().or_fail(terminal, next)? {
+            let mut keys = live.keys().or_fail(terminal, next)?;
+            keys.extend(self.look_at_page());
+            for key in keys {
                 match key {
                     Key::End => return Ok(Led::Stopped),
                     Key::Clutch | Key::Open if self.is_over() => {
@@ -139,7 +149,7 @@ impl Session {
         }
     }
 
-    fn is_over(&self) -> bool {
+    pub(super) fn is_over(&self) -> bool {
         self.guide.ended().is_some()
     }
 
@@ -236,7 +246,7 @@ impl Session {
         }
     }
 
-    fn view(&self) -> GuideView {
+    pub(super) fn view(&self) -> GuideView {
         let (end, good, keys) = self.end();
         GuideView {
             elapsed: self.started.elapsed(),

@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::Args;
 
 use crate::options::{ReadingOptions, model_parser, run_time};
+use crate::web::ViewOptions;
 use host::lines::Model;
 
 /// Options of `demo`.
@@ -13,6 +14,7 @@ use host::lines::Model;
 #[command(after_help = "\
 Examples:
   gauntlet demo
+  gauntlet demo --open --seconds 120
   gauntlet demo --poses my_hand.csv --log session.mcap
   gauntlet demo --seconds 60 --json > result.json
   gauntlet demo --gripper-model 2f85
@@ -61,6 +63,9 @@ pub struct Demo {
     /// The firmware for --on-chip, instead of the one that `cargo xtask firmware` built.
     #[arg(long, value_name = "ELF", requires = "on_chip")]
     pub firmware: Option<PathBuf>,
+    /// The page.
+    #[command(flatten)]
+    pub view: ViewOptions,
     /// Print the summary as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
@@ -82,6 +87,7 @@ impl Default for Demo {
             profile: None,
             on_chip: false,
             firmware: None,
+            view: ViewOptions::default(),
             json: false,
         }
     }

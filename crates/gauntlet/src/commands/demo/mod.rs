@@ -13,15 +13,21 @@ use anyhow::Result;
 use crate::progress::Person;
 use crate::results::maps::Start;
 use crate::results::{self, runs};
-use crate::run::{End, Finished, Options, Run};
+use crate::run::{End, Finished, Options, Run, drawn};
 use crate::tell::Tell;
+use crate::web::picture::{Headline, Picture, Tone};
+use crate::web::{Map, Page, space_map};
 use crate::{outputs, reading};
 use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::settings::Settings;
 use host::stats::seconds;
+use host::training::Outcome;
+use host::training::hand::MOST_FRAMES;
 use host::training::motion::Motion;
 use parts::{Stage, Started};
+
+use trainer::spread::spread;
 
 pub use args::Demo;
 
@@ -43,6 +49,10 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     if let Some(path) = &options.log {
         outputs::check_new(path, "a log")?;
     }
+    let mut page = Page::start(&options.view, &tell)?;
+    if let Some(page) = &mut page {
+        page.show(training);
+    }
     let start = match options.on_chip {
         true => on_chip::start,
         false => here::start,
@@ -53,6 +63,10 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         tell: &tell,
         interrupt,
     })?;
+    if let Some(page) = &page {
+        page.show_map(&map(options, &motion, &started.outcome));
+    }
+    started.run.shows(page, Some(drawn(options.gripper_model)));
     let driven = drive(options, &mut started, &tell);
     let prepared = started.drives.map(|at| (at - begun).as_secs_f64());
     let Started {
@@ -92,6 +106,26 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
         results::print("demo", result)?;
     }
     judgement
+}
+
+/// What of the gripper's space the motion reaches.
+fn map(options: &Demo, motion: &Motion, outcome: &Outcome) -> Map {
+    let frames = motion.frames();
+    let frames = frames.select(&spread(&frames, MOST_FRAMES));
+    let images = outcome.model.map_all(&frames);
+    space_map(parts::space(options), &images, &outcome.references)
+}
+
+/// What the page shows before there is anything to see.
+fn training() -> Picture {
+    Picture {
+        title: "gauntlet demo".to_owned(),
+        state: Headline {
+            words: "training the map".to_owned(),
+            tone: Tone::Wait,
+        },
+        ..Picture::default()
+    }
 }
 
 /// Brings everything up, activates, engages, runs.

@@ -77,6 +77,11 @@ pub(super) struct Started {
     pub(super) frame_wait: Duration,
 }
 
+/// The gripper's.
+pub(super) fn space(options: &Demo) -> Space {
+    Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger)
+}
+
 pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
     let Stage {
         options,
@@ -86,7 +91,7 @@ pub(super) fn trained(stage: Stage<'_>) -> Result<Outcome> {
     } = stage;
     let request = Request {
         motion,
-        space: Space::of_axes(options.gripper_model.axes()).unwrap_or(Space::ThreeFinger),
+        space: space(options),
         schedule: Schedule::Fast,
         epochs: None,
         pairs: PAIRS,

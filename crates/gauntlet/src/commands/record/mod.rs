@@ -14,6 +14,7 @@ use crate::options::run_time;
 use crate::outputs;
 use crate::results::{self, gloves, runs};
 use crate::tell::Tell;
+use crate::web::{Page, ViewOptions};
 use host::calibration::virtual_person::VirtualPerson;
 use host::clock::Clock;
 use host::failure::Failure;
@@ -42,6 +43,9 @@ pub struct Record {
     /// Write the poses into this new file.
     #[arg(long, value_name = "POSES.csv")]
     pub out: PathBuf,
+    /// The page.
+    #[command(flatten)]
+    pub view: ViewOptions,
     /// Record for so many seconds without prompts (1 to 86400).
     #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
     pub seconds: Option<Duration>,
@@ -54,6 +58,7 @@ pub struct Record {
 pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.at.json);
     outputs::check_new(&options.out, "a recording")?;
+    let page = Page::start(&options.view, &tell)?;
     let clock = Clock::start();
     let Opened {
         mut scanning,
@@ -69,6 +74,7 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     interrupt.look_after_file_limit();
     let (file, rows) = PosesFile::create(&options.out, interrupt, Some)?;
     let mut session = Session::new(scanning, hand, rows, options.at.json);
+    session.shows(page, options.at.side());
     let recorded = match options.seconds {
         Some(time) => session.free(time, interrupt),
         None => session.guided(interrupt),

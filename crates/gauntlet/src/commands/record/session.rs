@@ -3,9 +3,13 @@
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
+use glove::hand::Side;
+
 use crate::out;
 use crate::progress::Progress;
 use crate::results::gloves;
+use crate::web::picture::{Guide, Headline, Tone};
+use crate::web::{self, Page, Picture};
 use host::interrupt::Interrupt;
 use host::recording::poses::Row;
 use host::scanning::{Hand, Scanned, Scanning};
@@ -47,6 +51,11 @@ pub(super) struct Session {
     passed_over: u64,
     movements: Movements,
     newest: Instant,
+    /// The page, and whose hand it shows.
+    page: Option<Page>,
+    side: Side,
+    began: Instant,
+    angles: [f32; JOINT_COUNT],
 }
 
 impl Session {
@@ -63,7 +72,16 @@ impl Session {
             passed_over: 0,
             movements: Movements::default(),
             newest: Instant::now(),
+            page: None,
+            side: Side::Right,
+            began: Instant::now(),
+            angles: [0.0; JOINT_COUNT],
         }
+    }
+
+    /// Shows all of it on `page`, too.
+    pub fn shows(&mut self, page: Option<Page>, side: Side) {
+        (self.page, self.side) = (page, side);
     }
 
     /// Movement after movement, and what was not seen once more.
@@ -104,6 +122,7 @@ impl Session {
                     return Ok(false);
                 }
                 let done = before + began.elapsed().min(prompt.time);
+                self.show(prompt, (k + 1, prompts.len()), began.elapsed());
                 progress.at_with(ms(done), Some(total.saturating_sub(done)), || self.detail());
             }
             before += prompt.time;
@@ -142,6 +161,7 @@ impl Session {
     fn take(&mut self, scan: &Scanned, interrupt: &Interrupt) {
         self.newest = Instant::now();
         let pose = self.hand.take(scan);
+        self.angles = pose.angles;
         if !pose.is_whole() {
             self.passed_over += 1;
             return;
@@ -162,6 +182,40 @@ impl Session {
             // The writer has ended; it tells why.
             Err(TrySendError::Disconnected(_)) => interrupt.ask(),
         }
+    }
+
+    /// Shows what is asked for, and what comes of it.
+    fn show(&mut self, prompt: &Prompt, (part, parts): (usize, usize), elapsed: Duration) {
+        let Some(mut page) = self.page.take_if(|page| page.is_due()) else {
+            return;
+        };
+        let seen = self.scanning.snapshot();
+        let left = prompt.time.saturating_sub(elapsed);
+        let (calibrated, sigma) = (self.hand.is_calibrated(), self.hand.sigma());
+        let hand = web::scanned_hand(&self.angles, self.side, calibrated, seen.as_ref(), sigma);
+        page.show(|| Picture {
+            title: "gauntlet record".to_owned(),
+            elapsed_s: self.began.elapsed().as_secs_f64(),
+            state: Headline {
+                words: format!("recording: {} poses", self.written),
+                tone: Tone::Good,
+            },
+            hand: Some(hand),
+            rates: seen.as_ref().map(web::scan_rates),
+            guide: Some(Guide {
+                part,
+                parts,
+                name: "do this".to_owned(),
+                words: prompt.ask.to_owned(),
+                left_s: left.as_secs_f32(),
+                left: left.as_secs_f32() / prompt.time.as_secs_f32().max(1e-3),
+                counts: true,
+                remarks: vec![self.detail()],
+                ..Guide::default()
+            }),
+            ..Picture::default()
+        });
+        self.page = Some(page);
     }
 
     /// How it goes, in a line.

@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, ValueEnum};
 
 use crate::options::{DrivingOptions, LineOptions, OnOff, ReadingOptions, model_parser, run_time};
+use crate::web::ViewOptions;
 use host::lines::Model;
 
 /// Which hand wears the glove.
@@ -77,6 +78,9 @@ pub struct Teleop {
     /// Write every frame, command and status into this session log.
     #[arg(long, value_name = "FILE.mcap")]
     pub log: Option<PathBuf>,
+    /// The page.
+    #[command(flatten)]
+    pub view: ViewOptions,
     /// Print the summary as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,

@@ -13,9 +13,10 @@ use crate::options::OnOff;
 use crate::outputs;
 use crate::progress::Person;
 use crate::results;
-use crate::run::{LogTo, Options, Run};
+use crate::run::{LogTo, Options, Run, drawn};
 use crate::tell::Tell;
 use crate::wearer::Listener;
+use crate::web::Page;
 use host::calibration::virtual_person::VirtualPerson;
 use host::clock::Clock;
 use host::failure::Failure;
@@ -52,6 +53,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     if let Some(path) = &options.log {
         outputs::check_new(path, "a log")?;
     }
+    let page = Page::start(&options.view, &tell)?;
     let image = model::weights(&options.model, None, &Person)?.image;
     check_image(&image, model)?;
     for path in [&options.glove, &options.gripper] {
@@ -96,6 +98,8 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     };
     let mut run = Run::new(session, log, clock, interrupt.clone(), devices);
     run.finds_flat(options.find_flat == OnOff::On)?;
+    run.is_hand(side(options.hand));
+    run.shows(page, Some(drawn(model)));
     run.has(VirtualPerson::at(&options.glove).map(Listener::There));
     let prepared = prepare(options, &mut run, &tell, activation);
     let frames = !matches!(prepared, Ok(Prepared::NoFrames));
