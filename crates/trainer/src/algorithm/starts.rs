@@ -8,6 +8,8 @@
 
 mod checkpoint;
 mod cuts;
+mod runner;
+mod several;
 #[cfg(test)]
 mod tests;
 mod usual;

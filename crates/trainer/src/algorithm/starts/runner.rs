@@ -63,7 +63,11 @@ pub(super) fn judging((settings, judge): (&Settings, Judge), attraction: bool) -
 
 /// Of the pairs that were shown, the one that is not among `used` yet and whose target is nearest to `wanted`. A pair that was shown
 /// twice is there twice.
-pub(super) fn nearest_unused(shown: &Pairs, used: &Pairs, wanted: &[f32]) -> Option<(Vec<f32>, Vec<f32>)> {
+pub(super) fn nearest_unused(
+    shown: &Pairs,
+    used: &Pairs,
+    wanted: &[f32],
+) -> Option<(Vec<f32>, Vec<f32>)> {
     let row = |pairs: &Pairs, row: usize| {
         [pairs.inputs.row(row), pairs.targets.row(row)].map(<[f32]>::to_vec)
     };
