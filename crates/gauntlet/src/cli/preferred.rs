@@ -11,7 +11,15 @@ type Behind = (&'static str, &'static str, &'static [&'static str]);
 /// The verbs that read a glove at a port.
 const GLOVES: &[&str] = &["teleop", "calibrate", "record", "glove", "doctor"];
 /// The same, and that of the virtual one.
-const READ: &[&str] = &["teleop", "calibrate", "record", "glove", "doctor", "demo"];
+const READ: &[&str] = &[
+    "teleop",
+    "calibrate",
+    "record",
+    "glove",
+    "doctor",
+    "demo",
+    "train",
+];
 /// The verbs that talk to a gripper at a port.
 const GRIPPERS: &[&str] = &["teleop", "gripper", "doctor"];
 /// The verbs for which it matters what moves.

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
-use glove::hand::Side;
+use glove::hand::{JOINT_COUNT, Side};
 
 use crate::out;
 use crate::progress::Progress;
@@ -191,8 +191,14 @@ impl Session {
         };
         let seen = self.scanning.snapshot();
         let left = prompt.time.saturating_sub(elapsed);
-        let (calibrated, sigma) = (self.hand.is_calibrated(), self.hand.sigma());
-        let hand = web::scanned_hand(&self.angles, self.side, calibrated, seen.as_ref(), sigma);
+        let (calibrated, sigma) = (self.hand.is_calibrated(), self.hand.headings());
+        let hand = web::scanned_hand(
+            &self.angles,
+            self.side,
+            calibrated,
+            seen.as_ref(),
+            sigma.map(|known| known.sigma),
+        );
         page.show(|| Picture {
             title: "gauntlet record".to_owned(),
             elapsed_s: self.began.elapsed().as_secs_f64(),

@@ -72,11 +72,11 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
     speed::found(&tell, &options.glove, glove.found);
     let clock = Clock::start();
     let log = options.log.clone();
-    let drawn = Drawn {
+    let shape = Drawn {
         side: side(options.hand),
         gripper: model.kinematics(),
     };
-    let (log, feed) = log.map(|path| LogTo::new(path, drawn)).unzip();
+    let (log, feed) = log.map(|path| LogTo::new(path, shape)).unzip();
     let parts = Parts {
         glove: glove.line,
         reading: options.reading.given(),

@@ -7,7 +7,7 @@ use host::lines::Model;
 use host::training::PairChoice;
 
 use crate::commands::teleop::Hand as WhichHand;
-use crate::options::model_parser;
+use crate::options::{ReadingOptions, model_parser};
 use host::chip::link::Address;
 use trainer::cost::Cost;
 use trainer::measures::Coverage;
@@ -163,6 +163,9 @@ pub struct Worn {
     /// Which hand wears the glove, where no profile says.
     #[arg(long, value_enum, default_value_t = WhichHand::Right)]
     pub hand: WhichHand,
+    /// How the glove is read.
+    #[command(flatten)]
+    pub reading: ReadingOptions,
     /// Show each pose on the gripper at this port, too: the fingers move, slowly. It must be activated. Without it nothing moves.
     #[arg(
         long,

@@ -173,7 +173,7 @@ impl<'a> Worn<'a> {
                         );
                     }
                     Key::Clutch | Key::Open => free.go_on(self.now()),
-                    Key::Calibrate | Key::Again => {}
+                    Key::Calibrate | Key::Undo | Key::Again => {}
                 }
             }
             let Some(ask) = free.ask(self.now()) else {

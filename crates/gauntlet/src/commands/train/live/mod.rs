@@ -168,6 +168,7 @@ fn place(options: &Train) -> Result<Place<'_>> {
             profile: options.worn.profile.clone(),
             ideal: options.worn.ideal,
             hand: options.worn.hand,
+            reading: options.worn.reading,
             json: options.json,
         })),
         (None, None) => Err(Failure::usage(

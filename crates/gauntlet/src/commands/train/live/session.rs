@@ -106,13 +106,14 @@ impl<'a> Session<'a> {
                     Key::End => return Ok(Shown::Stopped),
                     Key::Clutch | Key::Open => Act::Finish,
                     Key::Again => Act::Redo,
+                    Key::Undo => Act::Undo,
                     Key::Calibrate => Act::Capture,
                 };
                 self.teaching.act(act, self.worn.now());
             }
             for key in live.others() {
                 let act = match key {
-                    b'u' | 0x7f => Act::Undo,
+                    0x7f => Act::Undo,
                     b's' => Act::Skip,
                     b'+' => Act::More,
                     // Typed right after another key.
