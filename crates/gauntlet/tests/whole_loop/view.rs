@@ -97,7 +97,8 @@ fn a_key_takes_the_newest_flat_pose_back_and_what_is_not_done_by_itself_stands_a
     terminal.keys(b"u");
     until_shown(&mut terminal, &["refused,", "(space)"]);
     terminal.keys(b"q");
-    assert_eq!(ends_soon(&mut terminal.child), Some(0));
+    let end = ends_soon(&mut terminal.child);
+    assert_eq!(end, Some(0), "{}", terminal.seen());
 }
 
 #[test]
