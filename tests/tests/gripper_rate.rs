@@ -102,6 +102,16 @@ struct Bench {
 impl Bench {
     /// A loop that follows the hand; the gripper was activated before.
     fn following(image: &[u8], config: driver::Config, hand: fn(f64) -> [f32; 25]) -> Self {
+        Self::reading(image, config, hand, glove::scan::Config::default())
+    }
+
+    /// The same with a glove that is read so.
+    fn reading(
+        image: &[u8],
+        config: driver::Config,
+        hand: fn(f64) -> [f32; 25],
+        scan: glove::scan::Config,
+    ) -> Self {
         let Devices {
             clock,
             glove,
@@ -112,7 +122,7 @@ impl Bench {
         gripper.preset_active();
         let app = App::new(
             Machine(clock.clone()),
-            Scanner::new(glove_wire, glove::scan::Config::default()),
+            Scanner::new(glove_wire, scan).with_set_baud(),
             ThreeFinger::new(wire.clone(), config),
             bench::store(image),
             Config::default(),
@@ -366,4 +376,44 @@ fn a_gripper_wire_cut_in_a_full_stroke_leaves_no_axis_more_than_forty_counts_fur
 #[ignore = "cargo xtask campaign: a cut at every byte, minutes"]
 fn whole_campaign_of_the_cuts() {
     cuts(1);
+}
+
+/// From the oldest sample used to the command's departure, in a minute of following, µs: half of the commands were faster, and 99 of
+/// 100. Of each frame the first command counts.
+fn ages(baud: u32, status_checks: bool) -> [u64; 2] {
+    let scan = glove::scan::Config {
+        raise_to: Some(baud),
+        status_checks,
+        ..glove::scan::Config::default()
+    };
+    let mut bench = Bench::reading(&image(), driver::Config::default(), waving, scan);
+    assert_eq!(bench.app.scanner_mut().baud(), baud);
+    let end = bench.now() + 60_000 * MS;
+    let (mut ages, mut before) = (Vec::new(), None);
+    while bench.now() < end {
+        bench.step();
+        let sent = bench.app.telemetry().sent;
+        if let Some(sent) = sent.filter(|sent| sent.follows && before != Some(sent.stamp)) {
+            before = Some(sent.stamp);
+            ages.push((sent.at - sent.stamp).as_micros());
+        }
+    }
+    assert_eq!(bench.app.telemetry().state, State::Following);
+    ages.sort_unstable();
+    [ages.len() / 2, ages.len() * 99 / 100].map(|place| ages[place])
+}
+
+#[test]
+fn at_460800_baud_half_of_all_commands_rest_on_samples_younger_than_17_ms_and_99_of_100_than_25() {
+    for baud in [115_200, 230_400, 460_800] {
+        for checks in [false, true] {
+            let [half, most] = ages(baud, checks);
+            let with = if checks { "with" } else { "without" };
+            println!("{baud} baud {with} status checks: p50 {half} us, p99 {most} us");
+            assert!(most <= 50_000);
+            if baud == 460_800 {
+                assert!(half <= 17_000 && most <= 25_000, "{half} {most}");
+            }
+        }
+    }
 }

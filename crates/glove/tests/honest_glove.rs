@@ -79,15 +79,17 @@ fn an_exact_person_without_soft_tissue_is_measured_within_a_degree() {
 }
 
 #[test]
-fn from_power_on_through_the_line_and_the_scanner_it_is_the_same() {
-    let mut course = Course::new(2);
-    (course.by_wire, course.lasts) = (true, 20.0);
-    let came = run(&course);
-    println!("{:.2?}", came.corrected.row());
-    assert_eq!(came.outcome.checks.identity, Identity::AsWired);
-    assert_eq!(doubts(&came), Vec::<String>::new());
-    assert!(came.corrected.hinges() <= 2.8);
-    assert!(came.corrected.mcp(0) <= 4.0);
+fn from_power_on_through_the_line_and_the_scanner_it_is_the_same_at_both_ends_of_its_speeds() {
+    for baud in [115_200, 460_800] {
+        let mut course = Course::new(2);
+        (course.by_wire, course.lasts) = (Some(baud), 20.0);
+        let came = run(&course);
+        println!("{baud} baud: {:.2?}", came.corrected.row());
+        assert_eq!(came.outcome.checks.identity, Identity::AsWired);
+        assert_eq!(doubts(&came), Vec::<String>::new());
+        assert!(came.corrected.hinges() <= 2.8);
+        assert!(came.corrected.mcp(0) <= 4.0);
+    }
 }
 
 fn heading() {

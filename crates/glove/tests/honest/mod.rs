@@ -43,8 +43,8 @@ pub struct Course {
     pub flat_each: f64,
     /// This segment's sensor slips by the angle (degrees) about an axis of the segment, before the last flat pose.
     pub slip: Option<(usize, f64, [f64; 3])>,
-    /// Through the serial line at 115,200 baud, by a scanner from power-on.
-    pub by_wire: bool,
+    /// Through the serial line at so many baud, by a scanner from power-on.
+    pub by_wire: Option<u32>,
 }
 
 impl Course {
@@ -62,7 +62,7 @@ impl Course {
             lasts: 0.0,
             flat_each: 60.0,
             slip: None,
-            by_wire: false,
+            by_wire: None,
         }
     }
 
@@ -135,10 +135,15 @@ impl Scans {
         let config = rig::glove::Config {
             side: course.side(),
             honest: Some(course.honest.clone()),
-            ..rig::glove::Config::at_baud(115_200)
+            ..rig::glove::Config::at_baud(course.by_wire.unwrap_or(115_200))
         };
-        let way = if course.by_wire {
-            let bench = Bench::worn(config, Box::new(person), glove::scan::Config::default());
+        let way = if let Some(baud) = course.by_wire {
+            let scan = glove::scan::Config {
+                baud,
+                status_checks: baud > 115_200,
+                ..glove::scan::Config::default()
+            };
+            let bench = Bench::worn(config, Box::new(person), scan);
             Way::Wire(Box::new(bench))
         } else {
             let glove = VirtualGlove::new(Box::new(person), config);
