@@ -283,7 +283,7 @@ fn film_strip_of_the_demo() {
     );
     let address = support::page::address(running.0.stderr.take().unwrap());
     let mut browser = Browser::start().expect("chromium");
-    browser.screen((1280, 830), 1.5, "dark");
+    browser.screen((1280, 930), 1.5, "dark");
     browser.go(&address);
     let end = Instant::now() + Duration::from_secs(600);
     let following = "document.getElementById('state')?.textContent === 'following'";
@@ -306,7 +306,7 @@ fn film_strip_of_the_demo() {
         .map(|png| format!("<img width=413 src='data:image/png;base64,{png}'>"))
         .collect();
     let sheet = format!(
-        "<body style='margin:0;background:#0e1116;width:1280px'><img id=first width=1280 src='data:image/png;base64,{whole}'><div style='display:flex;justify-content:space-between;padding:0 10px 14px'>{}</div></body>",
+        "<body style='margin:0;background:#0e1116;width:1280px'><img id=first width=1280 src='data:image/png;base64,{whole}'><div style='display:flex;justify-content:space-between;padding:12px 10px 14px'>{}</div></body>",
         rows.join("")
     );
     browser.show(&sheet);

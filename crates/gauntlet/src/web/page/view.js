@@ -29,7 +29,7 @@ let drawing = false;
 const series = { frames: [], cycles: [], latency: [] };
 
 const stages = {
-  hand: new Stage($("hand"), { yaw: Math.PI + 0.62, pitch: 0.16, target: [4, -8, 84], span: 262, floor: -22 }),
+  hand: new Stage($("hand"), { yaw: Math.PI + 0.62, pitch: 0.16, target: [4, -8, 84], span: 274, floor: -22 }),
   gripper: new Stage($("gripper"), { yaw: Math.PI - 0.95, pitch: 0.36, target: [0, 0, 70], span: 300, floor: -50 }),
 };
 for (const stage of Object.values(stages)) stage.moved = () => redraw();
@@ -391,6 +391,8 @@ function rates() {
   const now = performance.now();
   if (!rates || now - plotted < 250) return;
   plotted = now;
+  show("row-cycles", rates.cycles_per_s !== null);
+  show("row-latency", rates.cycles_per_s !== null);
   plot("plot-frames", series.frames, FINGERS[0]);
   plot("plot-cycles", series.cycles, FINGERS[1]);
   plot("plot-latency", series.latency, FINGERS[2]);
