@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::Shown;
+use super::shown::Shown;
 use host::training::judgement::Judgement;
 use host::training::judgement::influence::CAUSES;
 use host::words::{axis_words, gripper_words};
