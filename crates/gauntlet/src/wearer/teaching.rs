@@ -217,7 +217,11 @@ impl Lived {
     /// A failure that says what is wrong with the motion.
     pub fn lessons(&self, kept: &Kept) -> Result<(Lessons, Motion)> {
         let motion = Motion::open_for_training(Some(&kept.poses), self.seed, &Nobody)?;
-        let course = Course::hae(Schedule::Fast, None, self.seed);
+        // One thread: the same map, and a computer with other work does not stop it.
+        let course = Course {
+            threads: Some(1),
+            ..Course::hae(Schedule::Fast, None, self.seed)
+        };
         let lessons = Lessons::of_gripper(&motion, self.space, course, &Nobody)?;
         Ok((lessons, motion))
     }

@@ -19,6 +19,8 @@ const AVERAGED: Duration = Duration::from_ticks(420_000);
 const GAP: Duration = Duration::from_ticks(300_000);
 /// Every joint stays within this band, radians (8°): a hand in the air wobbles by 1° to 2°.
 const BAND: f32 = 0.14;
+/// After so long a hand need not have moved: the person may well mean what it shows, which is looked at then.
+const PATIENCE: Duration = Duration::from_ticks(8_000_000);
 /// The hand moved where a joint turned by so much, radians (12°).
 const MOVED: f32 = 0.21;
 /// From here on the hold is shown.
@@ -71,6 +73,7 @@ impl Hold {
         if let Some(before) = &self.before {
             self.moved |= (before.iter().zip(angles)).any(|(a, b)| (a - b).abs() > MOVED);
         }
+        self.moved |= self.asked.is_some_and(|asked| since(at, asked) >= PATIENCE);
         let held = self.held(at);
         (held >= HOLD).then(|| self.mean(at)).flatten()
     }
@@ -172,10 +175,11 @@ mod tests {
     }
 
     #[test]
-    fn a_hand_that_stays_where_it_was_is_never_taken_and_one_that_moved_and_holds_is() {
+    fn a_hand_that_stays_where_it_was_is_taken_late_and_one_that_moved_and_holds_is_at_once() {
         let mut hold = asked(0.0);
-        assert_eq!(played(&mut hold, (0, 20_000_000), |_| 0.05), None);
-        assert_eq!(hold.stage(at(20_000_000)), Stage::Movement);
+        assert_eq!(played(&mut hold, (0, 7_900_000), |_| 0.05), None);
+        assert_eq!(hold.stage(at(7_900_000)), Stage::Movement);
+        assert!(played(&mut hold, (7_900_000, 9_000_000), |_| 0.05).is_some());
         let mut hold = asked(0.0);
         let ramp = |t: u64| (t as f32 / 3e6).min(1.0);
         let (when, angle) = played(&mut hold, (0, 20_000_000), ramp).unwrap();

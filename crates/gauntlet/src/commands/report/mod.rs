@@ -3,12 +3,13 @@
 mod page;
 mod pictures;
 mod sections;
+mod shown;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use trainer::data::{Columns, Matrix, Pairs, Table};
+use trainer::data::{Columns, Pairs, Table};
 use trainer::hand::{Draw, Space};
 use trainer::model::Model;
 use trainer::whole_file;
@@ -26,6 +27,7 @@ use host::training::model;
 use host::training::motion::Motion;
 use host::training::pairs_kept::reference_pairs;
 use host::training::quality::{Quality, TARGETS};
+use shown::Shown;
 
 /// Options of `report`.
 #[derive(Debug, Args)]
@@ -54,20 +56,6 @@ pub struct Report {
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
-}
-
-/// Everything that the page shows.
-struct Shown<'a> {
-    file: &'a Path,
-    poses: &'a Path,
-    model: &'a Model,
-    space: Space,
-    motion: &'a Motion,
-    frames: &'a Matrix,
-    targets: &'a Matrix,
-    pairs: Option<&'a Pairs>,
-    held_out: Option<bool>,
-    judgement: &'a Judgement,
 }
 
 /// Judges and draws.

@@ -2,8 +2,9 @@
 
 use std::fmt::Write;
 
+use super::pictures;
 use super::sections::{escaped, influence, measures, pairs, reach, verdict};
-use super::{Shown, pictures};
+use super::shown::Shown;
 
 /// What a browser may fetch: nothing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";

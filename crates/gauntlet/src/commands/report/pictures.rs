@@ -10,7 +10,7 @@ use trainer::hand::Space;
 use trainer::measures::{NEIGHBOURS, dissimilarities};
 use trainer::spread::spread;
 
-use super::Shown;
+use super::shown::Shown;
 use crate::played;
 use host::training::quality::MEASURED;
 use host::words::axis_words;

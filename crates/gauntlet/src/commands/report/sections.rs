@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use super::Shown;
+use super::shown::Shown;
 use host::training::judgement::Judgement;
 use host::training::judgement::influence::CAUSES;
 use host::words::{axis_words, gripper_words};
@@ -178,7 +178,7 @@ pub(super) fn pairs(shown: &Shown<'_>) -> String {
     };
     for k in order {
         let pair = &pairs.each[k];
-        let class = if pair.left_out > 120.0 {
+        let class = if pair.left_out > 120.0 && pairs.each.len() > 5 {
             " class=\"odd\""
         } else {
             ""

@@ -147,24 +147,20 @@ impl Influence {
                 .iter()
                 .map(|&cause| {
                     let verb = match (name, row[cause] > 0.0, cause == CAUSES.len() - 1) {
-                        ("scissor", true, true) => "bring together",
-                        ("scissor", false, true) => "open",
-                        ("scissor", true, false) => "brings together",
-                        ("scissor" | _, false, false) => "opens",
-                        (_, true, true) => "close",
-                        (_, false, true) => "open",
-                        (_, true, false) => "closes",
+                        ("scissor", true, true) => "bring it together",
+                        ("scissor", false, true) => "open it",
+                        ("scissor", true, false) => "brings it together",
+                        ("scissor" | _, false, false) => "opens it",
+                        (_, true, true) => "close it",
+                        (_, false, true) => "open it",
+                        (_, true, false) => "closes it",
                     };
                     let whose = if cause == CAUSES.len() - 1 {
                         ""
                     } else {
                         "your "
                     };
-                    format!(
-                        "{whose}{} {verb} it by {:.0}",
-                        CAUSES[cause],
-                        row[cause].abs()
-                    )
+                    format!("{whose}{} {verb} by {:.0}", CAUSES[cause], row[cause].abs())
                 })
                 .collect();
             format!("{name}: {}", parts.join(", "))

@@ -4,10 +4,10 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use glove::calibration::Step;
-use glove::hand::JOINT_COUNT;
+use glove::hand::{JOINT_COUNT, Side};
 
-use super::side;
 use crate::commands::calibrate::source::{Place, Source};
+use crate::commands::teleop::Hand as WhichHand;
 use crate::commands::train::args::Train;
 use crate::live::teach::{Doing, TeachView};
 use crate::live::{Key, Live};
@@ -239,4 +239,12 @@ fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand
     }
     let (_, kept) = profile_of(options.worn.profile.as_deref(), &ids)?.map_err(none)?;
     Ok(Hand::with_profile(&kept.bound))
+}
+
+/// Which hand wears the glove, where no profile says.
+fn side(options: &Train) -> Side {
+    match options.worn.hand {
+        WhichHand::Right => Side::Right,
+        WhichHand::Left => Side::Left,
+    }
 }

@@ -9,7 +9,6 @@ mod shower;
 use std::time::Instant;
 
 use anyhow::Result;
-use glove::hand::Side;
 use trainer::data::read_samples;
 use trainer::hand::Space;
 
@@ -17,7 +16,6 @@ use super::args::Train;
 use super::request;
 use crate::commands::calibrate::source::Place;
 use crate::commands::glove::GloveAt;
-use crate::commands::teleop::Hand as WhichHand;
 use crate::progress::Person;
 use crate::results::{self, maps};
 use crate::tell::Tell;
@@ -176,13 +174,5 @@ fn place(options: &Train) -> Result<Place<'_>> {
             advice("--glove PORT; ").then(Command::gauntlet("ports").then(" lists them")),
         )
         .into()),
-    }
-}
-
-/// Which hand wears the glove, where no profile says.
-fn side(options: &Train) -> Side {
-    match options.worn.hand {
-        WhichHand::Right => Side::Right,
-        WhichHand::Left => Side::Left,
     }
 }

@@ -1,0 +1,24 @@
+//! What the page is of.
+
+use std::path::Path;
+
+use trainer::data::{Matrix, Pairs};
+use trainer::hand::Space;
+use trainer::model::Model;
+
+use host::training::judgement::Judgement;
+use host::training::motion::Motion;
+
+/// Everything that the page shows.
+pub(super) struct Shown<'a> {
+    pub file: &'a Path,
+    pub poses: &'a Path,
+    pub model: &'a Model,
+    pub space: Space,
+    pub motion: &'a Motion,
+    pub frames: &'a Matrix,
+    pub targets: &'a Matrix,
+    pub pairs: Option<&'a Pairs>,
+    pub held_out: Option<bool>,
+    pub judgement: &'a Judgement,
+}
