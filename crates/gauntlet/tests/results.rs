@@ -324,12 +324,11 @@ fn results_of_maps_keep_their_names() {
     };
     let log = recordings::ExportedLog {
         log: path("session.mcap"),
-        poses: Some(recordings::Table {
+        tables: vec![recordings::Table {
+            table: "poses",
             file: "session.poses.csv".into(),
             rows: 700,
-        }),
-        commands: None,
-        openxr: None,
+        }],
         openxr_angle_error_deg: None,
         finished: true,
         notes: Vec::new(),

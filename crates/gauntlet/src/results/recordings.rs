@@ -7,6 +7,8 @@ use serde::Serialize;
 /// A table that was written.
 #[derive(Debug, Serialize)]
 pub struct Table {
+    /// Which: `poses`, `commands` or `openxr`.
+    pub table: &'static str,
     /// Where.
     pub file: PathBuf,
     /// Rows below its header.
@@ -18,12 +20,8 @@ pub struct Table {
 pub struct ExportedLog<'a> {
     /// The log.
     pub log: &'a Path,
-    /// Its joint angles; `null` where they were not asked for.
-    pub poses: Option<Table>,
-    /// Its commands.
-    pub commands: Option<Table>,
-    /// The hand as OpenXR has it.
-    pub openxr: Option<Table>,
+    /// What was made of it.
+    pub tables: Vec<Table>,
     /// By how much the angles that follow from that differ from the log's, at most.
     pub openxr_angle_error_deg: Option<f32>,
     /// Whether the log ends with its index.

@@ -96,7 +96,10 @@ fn number(value: f32) -> Value {
     } else if value.is_infinite() {
         json!(if value > 0.0 { "Infinity" } else { "-Infinity" })
     } else {
-        json!(value)
+        // As few digits as it takes: a third of the file.
+        let short: f64 = value.to_string().parse().unwrap_or(f64::NAN);
+        let is_same = (short as f32).to_bits() == value.to_bits();
+        json!(if is_same { short } else { f64::from(value) })
     }
 }
 

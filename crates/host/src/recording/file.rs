@@ -79,6 +79,8 @@ pub(super) struct LogFile {
     ids: [u16; CHANNELS.len()],
     sequence: [u32; CHANNELS.len()],
     decoder: Decoder,
+    /// Log time of the newest message: it never goes back, and is never 0.
+    newest: u64,
     clock: Clock,
     /// What was written, and what of that is closed.
     written: Whole,
@@ -138,6 +140,7 @@ impl LogFile {
             ids,
             sequence: [0; CHANNELS.len()],
             decoder: Decoder::new(drawn),
+            newest: 1,
             clock,
             written: Whole::default(),
             whole: Whole::default(),
@@ -204,7 +207,7 @@ impl LogFile {
         let header = MessageHeader {
             channel_id: self.ids[index],
             sequence: self.sequence[index],
-            log_time: at,
+            log_time: self.log_time(at),
             publish_time: at,
         };
         self.sequence[index] = self.sequence[index].wrapping_add(1);
@@ -213,6 +216,12 @@ impl LogFile {
         let (first, last) = self.written.span.unwrap_or((at, at));
         self.written.span = Some((first.min(at), last.max(at)));
         Ok(())
+    }
+
+    /// The log time of a message of `at`: what is read one after the other was logged so.
+    fn log_time(&mut self, at: u64) -> u64 {
+        self.newest = self.newest.max(at);
+        self.newest
     }
 
     fn close_chunk(&mut self) -> McapResult<()> {

@@ -185,6 +185,26 @@ fn numbers_come_back_bit_for_bit() {
         .as_f64()
         .unwrap();
     assert_eq!(angle as f32, 0.1_f32);
+    // And in no more digits than that takes.
+    assert_eq!(angle, 0.1);
+}
+
+#[test]
+fn records_that_come_out_of_order_leave_no_log_time_that_goes_back() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (log, _feed) = log(&path, [5_000, 2_000, 9_000].map(|us| moved(us, |_| {})));
+    log.finish();
+    let bytes = std::fs::read(&path).unwrap();
+    let messages = mcap::MessageStream::new(&bytes)
+        .unwrap()
+        .map(Result::unwrap);
+    let times: Vec<(u64, u64)> = messages.map(|m| (m.log_time, m.publish_time)).collect();
+    assert!(
+        times[0].0 > 0 && times.is_sorted_by_key(|(logged, _)| *logged),
+        "{times:?}"
+    );
+    assert!(!times.is_sorted_by_key(|(_, happened)| *happened));
 }
 
 #[test]

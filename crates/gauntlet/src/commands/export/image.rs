@@ -3,7 +3,7 @@
 use anyhow::Result;
 use trainer::whole_file;
 
-use super::Export;
+use super::args::Export;
 use crate::outputs::{self, Kind};
 use crate::progress::Person;
 use crate::results::{self, maps};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use anyhow::Result;
 use trainer::whole_file;
 
-use super::Export;
+use super::args::Export;
 use crate::outputs;
 use crate::results::{self, recordings};
 use crate::tell::Tell;
@@ -61,34 +61,30 @@ pub(super) fn run(options: &Export) -> Result<()> {
         taken.push(path);
     }
     let log = export::read(&options.file)?;
-    let rows = |path: &Option<PathBuf>, count: usize, text: &dyn Fn() -> String| {
-        path.as_ref()
-            .map(|path| write(path, &text()).map(|()| count))
-            .transpose()
-    };
-    let mut worst = 0.0;
+    let mut error = None;
+    let mut written = Vec::new();
     let (poses, commands) = (log.poses.len(), log.commands.len());
-    let openxr = match &tables.openxr {
-        None => None,
-        Some(path) => {
-            let (text, difference) = log.openxr_csv();
-            worst = difference;
-            write(path, &text)?;
-            Some(poses)
-        }
+    let mut make = |table, path: &Option<PathBuf>, rows, text: &mut dyn FnMut() -> String| {
+        let Some(file) = path.clone() else {
+            return Ok(());
+        };
+        write(&file, &text())?;
+        written.push(recordings::Table { table, file, rows });
+        anyhow::Ok(())
     };
-    let poses = rows(&tables.poses, poses, &|| log.poses_csv())?;
-    let commands = rows(&tables.commands, commands, &|| log.commands_csv())?;
-    let table = |file: &Option<PathBuf>, rows: Option<usize>| {
-        let file = file.clone()?;
-        Some(recordings::Table { file, rows: rows? })
-    };
+    make("poses", &tables.poses, poses, &mut || log.poses_csv())?;
+    make("commands", &tables.commands, commands, &mut || {
+        log.commands_csv()
+    })?;
+    make("openxr", &tables.openxr, poses, &mut || {
+        let (text, worst) = log.openxr_csv();
+        error = Some(worst.to_degrees());
+        text
+    })?;
     let exported = recordings::ExportedLog {
         log: &options.file,
-        poses: table(&tables.poses, poses),
-        commands: table(&tables.commands, commands),
-        openxr: table(&tables.openxr, openxr),
-        openxr_angle_error_deg: openxr.map(|_| worst.to_degrees()),
+        tables: written,
+        openxr_angle_error_deg: error,
         finished: log.finished,
         notes: log.notes(),
     };
@@ -98,15 +94,8 @@ pub(super) fn run(options: &Export) -> Result<()> {
     for note in &exported.notes {
         tell.say(format_args!("note: {}: {note}", options.file.display()));
     }
-    for (what, table) in [
-        ("poses", &exported.poses),
-        ("commands", &exported.commands),
-        ("openxr", &exported.openxr),
-    ] {
-        if let Some(table) = table {
-            let file = table.file.display();
-            tell.say(format_args!("{what:<10} {file}, {} rows", table.rows));
-        }
+    for recordings::Table { table, file, rows } in &exported.tables {
+        tell.say(format_args!("{table:<10} {}, {rows} rows", file.display()));
     }
     if let Some(error) = exported.openxr_angle_error_deg {
         tell.say(format_args!(
