@@ -12,9 +12,8 @@ use loop_tests::emulated::{Loop, alone, cut_power};
 use loop_tests::power_cuts::{
     self, UNIT, every_pair, every_single, four_kilobytes, full_size, small,
 };
-use loop_tests::replay::{GRIPPER, VALUES, records};
 use loop_tests::trace::{self, record};
-use loop_tests::{bits, images, replay, slot_contents};
+use loop_tests::{bits, images, slot_contents};
 
 const SEED: u64 = 0x6175_6E74_6C65_7400;
 /// Gripper cycles a second that a bridge on the chip must reach.
@@ -134,17 +133,17 @@ fn same_bits() -> Result<(), String> {
             faulty,
             seed,
         );
-        let here = replayed(&recorded.trace)?;
+        let here = trace::replayed(&recorded.trace);
+        if here != recorded.trace {
+            return Err(format!("trace {seed}: its replay here differs"));
+        }
         let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false)?;
         if here != chip {
             return Err(format!("trace {seed}: the chip's output differs"));
         }
-        let count = |port| records(&here).filter(|record| record.port == port).count();
         println!(
-            "trace {seed}, faulty {faulty}: {} bytes in; {} writes to the gripper, {} frames' angles, outputs and targets: the same {} bytes",
-            recorded.trace.len(),
-            count(GRIPPER),
-            count(VALUES),
+            "trace {seed}, faulty {faulty}: {:?}: the same {} bytes when it was taken, here and there",
+            trace::counts(&here),
             here.len()
         );
     }
@@ -160,14 +159,6 @@ fn recorded_or_moving() -> impl Fn(f64) -> bits::Pose + Send {
         }
         length => hand[(time_s * 30.0) as usize % length],
     }
-}
-
-fn replayed(trace: &[u8]) -> Result<Vec<u8>, String> {
-    let mut room = vec![0; 6 << 20];
-    let length = replay::run(trace, &mut room, trace::slots(), trace::slots())
-        .ok_or("no room for the output")?;
-    room.truncate(length);
-    Ok(room)
 }
 
 fn counts() -> Result<String, String> {

@@ -1,5 +1,6 @@
 //! The ways to a glove's sensors: a serial port with an SC18IM, or an I²C port of this computer.
 
+use bridge::trace::{GLOVE, Tapped};
 use glove::Instant;
 use glove::bus::{Batch, Bus, Error, Reply};
 use glove::sc18im::Sc18im;
@@ -8,6 +9,7 @@ use glove::timing::FUSION_PERIOD;
 
 use super::i2c;
 use super::port::{Port, Watch};
+use crate::trace::TraceLog;
 
 /// An open way to a glove.
 #[derive(Debug)]
@@ -28,10 +30,11 @@ impl GloveLine {
     }
 
     /// The scanner on it. The speed of a serial port is found and kept by it; on an I²C port a scan takes less than the sensors need
-    /// for new samples, so that it begins no more than one in that time.
-    pub fn scanner(self, mut config: Config) -> BusScanner<GloveBus> {
+    /// for new samples, so that it begins no more than one in that time. What a serial port carries goes to `trace`.
+    pub fn scanner(self, mut config: Config, trace: TraceLog) -> BusScanner<GloveBus> {
         let bus = match self {
             Self::Serial(port) => {
+                let port = Tapped::new(port, GLOVE, trace);
                 let scanner = Scanner::new(port, config).with_set_baud();
                 GloveBus::Serial(Box::new(scanner.into_bus()))
             }
@@ -54,7 +57,7 @@ impl From<Port> for GloveLine {
 #[derive(Debug)]
 pub enum GloveBus {
     /// Behind a serial bridge.
-    Serial(Box<Sc18im<Port>>),
+    Serial(Box<Sc18im<Tapped<Port, TraceLog>>>),
     /// On an I²C port.
     I2c(i2c::Port),
 }

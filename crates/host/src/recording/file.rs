@@ -4,23 +4,29 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use gripper::Instant as Moment;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{MAGIC, McapResult, WriteOptions, Writer};
 
 use super::channels::{self, CHANNELS, Channel};
 use crate::clock::Clock;
-use crate::session::record::Record;
+use crate::session::record::{Record, Records};
 use crate::words::disk;
 
 /// Bytes to a chunk at most; most are closed by time.
 const CHUNK: u64 = 1 << 20;
 /// Records to a chunk at most: those of the bring-up come all at once.
 const RECORDS: usize = 128;
+/// The topic of the trace's blocks, and their coding: the clock's reading before the block and its newest one in the block,
+/// µs, u64 little-endian; then entries as [`bridge::trace`] codes them.
+pub const TRACE_TOPIC: &str = "/bridge/trace";
+/// The name of that coding.
+pub const TRACE_ENCODING: &str = "gauntlet.trace";
 /// Pause between two closed chunks: a program that is killed loses no more.
 const CLOSE_EVERY: Duration = Duration::from_millis(500);
 /// Pause between two looks whether the log is to end.
@@ -77,6 +83,10 @@ pub(super) struct LogFile {
     file: File,
     ids: [u16; CHANNELS.len()],
     sequence: [u32; CHANNELS.len()],
+    /// The trace's channel, its next number, and an empty block's memory.
+    trace: (u16, u32, Vec<u8>),
+    /// Log time of the newest message: it never goes back, and is never 0.
+    newest: u64,
     clock: Clock,
     /// What was written, and what of that is closed.
     written: Whole,
@@ -116,7 +126,7 @@ impl LogFile {
             .chunk_size(Some(CHUNK))
             // A chunk is put together in memory: what is in the file is whole.
             .disable_seeking(true)
-            .library(concat!("gauntlet ", env!("CARGO_PKG_VERSION")))
+            .library(crate::trace::PROGRAM)
             .create(NoSeek::new(sink))?;
         let mut ids = [0; CHANNELS.len()];
         for (channel, id) in CHANNELS.iter().zip(&mut ids) {
@@ -127,12 +137,17 @@ impl LogFile {
             )?;
             *id = writer.add_channel(schema, channel.topic, "json", &Default::default())?;
         }
+        let version = bridge::trace::VERSION.to_string();
+        let metadata = [("version".to_owned(), version)].into();
+        let trace = writer.add_channel(0, TRACE_TOPIC, TRACE_ENCODING, &metadata)?;
         writer.flush()?;
         let mut log = Self {
             writer,
             file,
             ids,
             sequence: [0; CHANNELS.len()],
+            trace: (trace, 0, Vec::new()),
+            newest: 1,
             clock,
             written: Whole::default(),
             whole: Whole::default(),
@@ -144,16 +159,15 @@ impl LogFile {
 
     /// Writes what comes, until nothing can come any more, or `closing` is set and what waited is written, or the file takes
     /// nothing.
-    pub(super) fn write_all(&mut self, records: &Receiver<Record>, closing: &AtomicBool) {
-        let result = self.write_until_end(records, closing);
+    pub(super) fn write_all(&mut self, records: &Records, closing: &AtomicBool) {
+        let result = self
+            .write_until_end(records, closing)
+            .and_then(|()| self.write_trace(records));
+        records.trace.close();
         self.note(&result);
     }
 
-    fn write_until_end(
-        &mut self,
-        records: &Receiver<Record>,
-        closing: &AtomicBool,
-    ) -> McapResult<()> {
+    fn write_until_end(&mut self, records: &Records, closing: &AtomicBool) -> McapResult<()> {
         let mut close = Instant::now() + CLOSE_EVERY;
         let mut sync = Instant::now() + SYNC_EVERY;
         let mut waiting = 0;
@@ -163,7 +177,7 @@ impl LogFile {
                 true => Duration::ZERO,
                 false => LOOK.min(close.saturating_duration_since(Instant::now())),
             };
-            match records.recv_timeout(wait) {
+            match records.records.recv_timeout(wait) {
                 Ok(record) => {
                     self.write(&record)?;
                     waiting += 1;
@@ -174,6 +188,7 @@ impl LogFile {
             }
             let now = Instant::now();
             if now >= close || waiting >= RECORDS {
+                self.write_trace(records)?;
                 self.close_chunk()?;
                 waiting = 0;
                 close = now + CLOSE_EVERY;
@@ -199,7 +214,7 @@ impl LogFile {
         let header = MessageHeader {
             channel_id: self.ids[index],
             sequence: self.sequence[index],
-            log_time: at,
+            log_time: self.log_time(at),
             publish_time: at,
         };
         self.sequence[index] = self.sequence[index].wrapping_add(1);
@@ -207,6 +222,32 @@ impl LogFile {
         self.written.messages += 1;
         let (first, last) = self.written.span.unwrap_or((at, at));
         self.written.span = Some((first.min(at), last.max(at)));
+        Ok(())
+    }
+
+    /// The log time of a message of `at`: what is read one after the other was logged so.
+    fn log_time(&mut self, at: u64) -> u64 {
+        self.newest = self.newest.max(at);
+        self.newest
+    }
+
+    /// Writes what waits of the trace as one message.
+    fn write_trace(&mut self, records: &Records) -> McapResult<()> {
+        let Some(block) = records.trace.take(std::mem::take(&mut self.trace.2)) else {
+            return Ok(());
+        };
+        let at = self.clock.wall_ns(Moment::from_ticks(block.at));
+        let header = MessageHeader {
+            channel_id: self.trace.0,
+            sequence: self.trace.1,
+            log_time: self.log_time(at),
+            publish_time: at,
+        };
+        self.trace.1 = self.trace.1.wrapping_add(1);
+        let mut message = [block.since, block.at].map(u64::to_le_bytes).concat();
+        message.extend_from_slice(&block.bytes);
+        self.trace.2 = block.bytes;
+        self.writer.write_to_known_channel(&header, &message)?;
         Ok(())
     }
 

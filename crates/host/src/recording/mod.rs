@@ -12,6 +12,8 @@
 mod channels;
 mod file;
 pub mod poses;
+pub mod reader;
+pub mod traced;
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -109,7 +111,7 @@ impl SessionLog {
         let writer = std::thread::Builder::new()
             .name("session log".to_owned())
             .spawn(move || {
-                file.write_all(&records.records, &closed);
+                file.write_all(&records, &closed);
                 file.finish()
             })
             .or_fail(what, "ending other programs")?;

@@ -1,0 +1,210 @@
+//! The trace of a session's log through the bridge again.
+//!
+//! The same bytes at the same instants give the same commands bit for bit: [`same`] looks, and names the first difference.
+//! With another map, profile or other settings the bridge does something else: [`other`] gives it the bytes by their times,
+//! and [`compare`] says by how much its commands differ.
+
+use anyhow::Result;
+use bridge::trace::{Difference, GLOVE, GRIPPER, Look, Loose, Port, Source, Strict, settings};
+use bridge::{App, Board, Instant, Platform, Settings};
+use glove::calibration::Bound;
+use glove::sc18im::Sc18im;
+use glove::scan::{self, BusScanner, Scanner};
+use gripper::driver::{ThreeFinger, TwoFinger};
+
+use crate::failure::Failure;
+use crate::lines::port::BAUD;
+use crate::recording::traced::Traced;
+use crate::session::slots::MemorySlot;
+use crate::session::stored::stored;
+
+mod compared;
+
+pub use compared::{Apart, Compared, compare};
+
+/// Who follows a replay.
+pub trait Follow {
+    /// Before each turn of the loop; at `at` µs. Returns whether it goes on.
+    fn turn<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>, at: u64) -> bool;
+}
+
+/// Nobody looks.
+impl Follow for () {
+    fn turn<B: Board<X>, const X: usize>(&mut self, _: &mut App<B, X>, _: u64) -> bool {
+        true
+    }
+}
+
+/// What another bridge is made of, where that is not as in the log.
+#[derive(Debug, Clone, Default)]
+pub struct Changes {
+    /// Its weights image.
+    pub image: Option<Vec<u8>>,
+    /// The glove's profile.
+    pub profile: Option<Bound>,
+    /// How the gripper is driven.
+    pub driving: crate::session::Driving,
+}
+
+/// How a replay of the same bridge went.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Same {
+    /// Time in the log that was replayed, µs.
+    pub time_us: u64,
+    /// Turns of the bridge's loop.
+    pub turns: u64,
+    /// Frames and changes of state that were as in the log.
+    pub seen: u64,
+    /// Bytes written as in the log: to the glove and to the gripper.
+    pub written: [u64; 2],
+    /// When the bridge first did something else, µs, and what.
+    pub difference: Option<(u64, Difference)>,
+    /// Why the log's trace ends before its last byte.
+    pub cut: Option<String>,
+}
+
+/// Replays the log with the same bridge.
+///
+/// # Errors
+/// A failure where no bridge can be made of what the log holds.
+pub fn same(traced: &Traced, follow: &mut impl Follow) -> Result<Same> {
+    let strict = Strict::new(&traced.bytes);
+    run(&strict, traced, &Changes::default(), follow)?;
+    let cut = match (strict.damage(), strict.has_gap(), traced.gap) {
+        (Some(damage), _, _) => Some(damage.to_string()),
+        (None, true, _) => {
+            Some("the disk or the queue was too slow here: bytes are missing".to_owned())
+        }
+        (None, false, Some((from, to))) => Some(format!(
+            "from {:.3} s to {:.3} s the log is damaged",
+            seconds(from),
+            seconds(to)
+        )),
+        (None, false, None) => None,
+    };
+    Ok(Same {
+        time_us: strict.at(),
+        turns: strict.turns(),
+        seen: strict.seen_alike(),
+        written: [GLOVE, GRIPPER].map(|port| strict.written(port)),
+        difference: strict.difference(),
+        cut,
+    })
+}
+
+fn seconds(us: u64) -> f64 {
+    us as f64 * 1e-6
+}
+
+/// Replays the log with another bridge, by the times of its bytes.
+///
+/// # Errors
+/// As [`same`].
+pub fn other(traced: &Traced, changes: &Changes, follow: &mut impl Follow) -> Result<()> {
+    run(&Loose::new(&traced.bytes), traced, changes, follow)
+}
+
+/// The trace as a board.
+#[derive(Debug)]
+struct Home<'s, S>(&'s S);
+
+impl<S: Source> Platform for Home<'_, S> {
+    fn now(&mut self) -> Instant {
+        self.0.now()
+    }
+
+    fn wait_until(&mut self, due: Instant) {
+        self.0.wait_until(due);
+    }
+}
+
+impl<'s, S: Source> Board<4> for Home<'s, S> {
+    type Glove = Sc18im<Port<'s, S>>;
+    type Gripper = ThreeFinger<Port<'s, S>>;
+    type Flash = MemorySlot;
+}
+
+impl<'s, S: Source> Board<1> for Home<'s, S> {
+    type Glove = Sc18im<Port<'s, S>>;
+    type Gripper = TwoFinger<Port<'s, S>>;
+    type Flash = MemorySlot;
+}
+
+fn run<S: Source>(
+    source: &S,
+    traced: &Traced,
+    changes: &Changes,
+    follow: &mut impl Follow,
+) -> Result<()> {
+    if traced.home.glove != "serial" {
+        return Err(Failure::new(
+            "the log's glove was on an I²C port, whose bytes a log does not hold",
+            "a log of a glove on a serial port",
+        )
+        .into());
+    }
+    match traced.model.two_finger() {
+        None => turns::<4, _>(source, traced, changes, follow, ThreeFinger::new),
+        Some(model) => {
+            let driver = move |line, config| TwoFinger::new(line, model, config);
+            turns::<1, _>(source, traced, changes, follow, driver)
+        }
+    }
+}
+
+fn turns<'s, const X: usize, S: Source>(
+    source: &'s S,
+    traced: &Traced,
+    changes: &Changes,
+    follow: &mut impl Follow,
+    driver: impl FnOnce(Port<'s, S>, gripper::driver::Config) -> <Home<'s, S> as Board<X>>::Gripper,
+) -> Result<()>
+where
+    Home<'s, S>: Board<X, Glove = Sc18im<Port<'s, S>>, Flash = MemorySlot>,
+{
+    let image = changes.image.as_deref().unwrap_or(&traced.image);
+    let store = stored(image, traced.model)?;
+    let unusable = || Failure::new("the log's settings cannot be used", "another log");
+    let logged = settings::<X>(&traced.settings, Settings::default()).ok_or_else(unusable)?;
+    let changed = changes.driving.over(*logged.settings());
+    let config = bridge::Config::new(changed).map_err(|error| {
+        Failure::usage(
+            format!("the bridge's settings: {error}"),
+            "a value in its range",
+        )
+    })?;
+    let scan = scan::Config {
+        baud: BAUD,
+        ..scan::Config::default()
+    };
+    let bus = Scanner::new(Port::new(source, GLOVE), scan).with_set_baud();
+    let scanner = BusScanner::on(bus.into_bus(), scan);
+    let gripper = driver(Port::new(source, GRIPPER), traced.home.driver());
+    let mut app = App::new(Home(source), scanner, gripper, store, config);
+    let profile = changes.profile.as_ref();
+    if let Some(profile) = profile.or(traced.profile.as_ref()) {
+        // The clutch is open.
+        let _ = app.set_profile(Some(profile));
+    }
+    let mut look = Look::default();
+    loop {
+        while let Some(order) = source.order() {
+            match (order, profile) {
+                // Another profile stays the one in use.
+                (bridge::trace::Order::Profile(_), Some(profile)) => {
+                    let _ = app.set_profile(Some(profile));
+                }
+                (order, _) => drop(order.give(&mut app)),
+            }
+        }
+        if let Some(seen) = look.look(app.telemetry()) {
+            source.see(seen);
+        }
+        let at = app.telemetry().now.as_ticks();
+        if !follow.turn(&mut app, at) || source.is_over() {
+            return Ok(());
+        }
+        let due = app.step();
+        app.platform_mut().wait_until(due);
+    }
+}

@@ -1,0 +1,286 @@
+//! The bridge's trace ([`bridge::trace`]) on its way from the bridge's thread to a session log's writer.
+//!
+//! The thread codes each entry into memory and never waits for the disk; the writer takes what lies there each half second.
+//! At most [`MOST`] bytes wait, above all those that come before the log is made. What finds no room is counted, and the trace
+//! says where it is missing.
+
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use bridge::trace::{Entry, Note, Noted, Part, Recorder, Sink};
+use glove::calibration::Bound;
+use gripper::Instant;
+use serde::{Deserialize, Serialize};
+
+/// What a log says it was written by.
+pub const PROGRAM: &str = concat!("gauntlet ", env!("CARGO_PKG_VERSION"));
+
+/// Bytes of a trace that may wait.
+pub const MOST: usize = 4 << 20;
+/// Room from the start: more than half a second.
+const USUAL: usize = 64 << 10;
+
+/// What a PC's bridge says of itself at the start of its trace: a replay makes the same one.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Home {
+    /// The program and its version.
+    pub program: String,
+    /// Which gripper: `3f`, `2f85`, `2f140` or `hande`.
+    pub gripper_model: String,
+    /// The way to the glove: `serial` or `i2c`.
+    pub glove: String,
+    /// Whether the gripper is on a network.
+    pub network: bool,
+    /// The driver of the gripper's line: unit, baud, then times in µs.
+    pub unit: u8,
+    /// Baud, as its deadlines are computed.
+    pub baud: u32,
+    /// From a request to the start of its reply, µs.
+    pub response_us: u64,
+    /// Silence between frames, µs; none for the standard's.
+    pub silence_us: Option<u64>,
+    /// Least time from one request to the next, µs.
+    pub cycle_us: u64,
+    /// By how much later an answer may come, µs.
+    pub patience_us: u64,
+    /// Whether reserved bits and the family are checked.
+    pub check_reserved: bool,
+    /// Whether a gripper of another family is refused.
+    pub check_family: bool,
+}
+
+impl Home {
+    /// Of a bridge with such a gripper, by its name on the command line, and such a way to the glove.
+    pub fn new(
+        model: &str,
+        network: bool,
+        line: &gripper::driver::Config,
+        serial_glove: bool,
+    ) -> Self {
+        Self {
+            program: PROGRAM.to_owned(),
+            gripper_model: model.to_owned(),
+            glove: if serial_glove { "serial" } else { "i2c" }.to_owned(),
+            network,
+            unit: line.unit,
+            baud: line.baud,
+            response_us: line.response.as_ticks(),
+            silence_us: line.silence.map(|silence| silence.as_ticks()),
+            cycle_us: line.cycle.as_ticks(),
+            patience_us: line.patience.as_ticks(),
+            check_reserved: line.check_reserved,
+            check_family: line.check_family,
+        }
+    }
+
+    /// Of a trace that does not say.
+    pub fn unknown() -> Self {
+        let mut home = Self::new("3f", false, &gripper::driver::Config::for_pc(), true);
+        home.program.clear();
+        home
+    }
+
+    /// How the gripper's driver was set up.
+    pub fn driver(&self) -> gripper::driver::Config {
+        let us = gripper::Duration::from_ticks;
+        gripper::driver::Config {
+            unit: self.unit,
+            baud: self.baud,
+            response: us(self.response_us),
+            silence: self.silence_us.map(us),
+            cycle: us(self.cycle_us),
+            patience: us(self.patience_us),
+            check_reserved: self.check_reserved,
+            check_family: self.check_family,
+        }
+    }
+}
+
+/// Bytes that wait for the writer.
+#[derive(Debug)]
+struct Waiting {
+    bytes: Vec<u8>,
+    /// Time of the clock's newest reading before the first of them, and of the newest one, µs.
+    since: u64,
+    at: u64,
+    /// Bytes for which there was no room since the last block.
+    missing: u64,
+    lost: u64,
+    /// Nobody takes them any more.
+    closed: bool,
+}
+
+impl Sink for Waiting {
+    fn put(&mut self, head: &[u8], body: &[u8]) {
+        let length = head.len() + body.len();
+        // A trace with a hole goes on with a block of its own.
+        if self.closed || self.missing > 0 || self.bytes.len() + length > MOST {
+            self.missing += length as u64;
+            self.lost += length as u64;
+            return;
+        }
+        self.bytes.extend_from_slice(head);
+        self.bytes.extend_from_slice(body);
+    }
+}
+
+/// A part of a trace: whole entries.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct Block {
+    /// The clock's newest reading before it, µs: what its first one counts from.
+    pub since: u64,
+    /// Its newest one, µs.
+    pub at: u64,
+    /// The entries.
+    pub bytes: Vec<u8>,
+}
+
+/// Where a bridge's trace is written, or nowhere. Clones write the same one.
+#[derive(Debug, Clone, Default)]
+pub struct TraceLog(Option<Arc<Mutex<Recorder<Waiting>>>>);
+
+impl TraceLog {
+    /// An empty trace.
+    pub fn new() -> Self {
+        let waiting = Waiting {
+            bytes: Vec::with_capacity(USUAL),
+            since: 0,
+            at: 0,
+            missing: 0,
+            lost: 0,
+            closed: false,
+        };
+        Self(Some(Arc::new(Mutex::new(Recorder::new(waiting)))))
+    }
+
+    /// The beginning: what the bridge is made of.
+    pub fn begin<const X: usize>(
+        &self,
+        home: &Home,
+        settings: &bridge::Settings<X>,
+        image: &[u8],
+        profile: Option<&Bound>,
+    ) {
+        let part = |part, bytes: &[u8]| self.note(&Entry::Part { part, bytes });
+        self.note(&Entry::Head { axes: X as u8 });
+        // Plain strings and numbers are always JSON.
+        let home = serde_json::to_vec(home).unwrap_or_default();
+        part(Part::Home, &home);
+        part(Part::Settings, &bridge::trace::configuration(settings));
+        part(Part::Image, image);
+        if let Some(profile) = profile {
+            part(Part::Profile, &profile.to_bytes());
+        }
+    }
+
+    fn lock(&self) -> Option<MutexGuard<'_, Recorder<Waiting>>> {
+        // Nothing panics while holding it; a poisoned lock still holds whole entries.
+        let recorder = self.0.as_ref()?;
+        Some(recorder.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+
+    /// What waits, in exchange for an empty `spare`; `None` where nothing does.
+    pub fn take(&self, mut spare: Vec<u8>) -> Option<Block> {
+        spare.clear();
+        let mut recorder = self.lock()?;
+        let waiting = recorder.sink_mut();
+        if waiting.bytes.is_empty() && waiting.missing == 0 {
+            return None;
+        }
+        let missing = std::mem::take(&mut waiting.missing);
+        let block = Block {
+            since: waiting.since,
+            at: waiting.at,
+            bytes: std::mem::replace(&mut waiting.bytes, spare),
+        };
+        waiting.since = waiting.at;
+        if missing > 0 {
+            recorder.note(&Entry::Lost { bytes: missing });
+        }
+        Some(block)
+    }
+
+    /// Nothing is taken any more: nothing need wait.
+    pub fn close(&self) {
+        if let Some(mut recorder) = self.lock() {
+            let waiting = recorder.sink_mut();
+            waiting.closed = true;
+            waiting.bytes = Vec::new();
+        }
+    }
+
+    /// Bytes that found no room, so that a replay ends where they are missing.
+    pub fn lost(&self) -> u64 {
+        self.lock()
+            .map_or(0, |mut recorder| match recorder.sink_mut() {
+                waiting if waiting.closed => 0,
+                waiting => waiting.lost,
+            })
+    }
+}
+
+impl Note for TraceLog {
+    fn with(&self, with: impl FnOnce(&mut dyn Noted)) {
+        if let Some(mut recorder) = self.lock() {
+            with(&mut *recorder);
+        }
+    }
+
+    fn clock(&self, at: Instant) {
+        if let Some(mut recorder) = self.lock() {
+            recorder.clock(at);
+            recorder.sink_mut().at = at.as_ticks();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use bridge::trace::Reader;
+
+    fn entries(bytes: &[u8], since: u64) -> Vec<Entry<'_>> {
+        let mut reader = Reader::since(bytes, since);
+        std::iter::from_fn(|| reader.read().unwrap()).collect()
+    }
+
+    #[test]
+    fn blocks_hold_whole_entries_and_count_from_where_the_last_one_ended() {
+        let log = TraceLog::new();
+        log.clock(Instant::from_ticks(1_000));
+        let read = Entry::Read {
+            port: 1,
+            bytes: &[1, 2, 3],
+        };
+        log.note(&read);
+        let first = log.take(Vec::new()).unwrap();
+        log.waited();
+        log.clock(Instant::from_ticks(1_500));
+        let second = log.take(Vec::new()).unwrap();
+        assert_eq!(log.take(Vec::new()), None);
+        assert_eq!((first.since, first.at), (0, 1_000));
+        assert_eq!((second.since, second.at), (1_000, 1_500));
+        let turn = |at| Entry::Clock { turn: true, at };
+        assert_eq!(entries(&first.bytes, 0), [turn(1_000), read]);
+        assert_eq!(entries(&second.bytes, 1_000), [turn(1_500)]);
+        TraceLog::default().note(&read);
+        assert_eq!(TraceLog::default().take(Vec::new()), None);
+    }
+
+    #[test]
+    fn what_finds_no_room_is_counted_and_the_trace_says_where_it_is_missing() {
+        let log = TraceLog::new();
+        let bytes = vec![7; MOST / 2];
+        let read = Entry::Read {
+            port: 1,
+            bytes: &bytes,
+        };
+        for _ in 0..3 {
+            log.note(&read);
+        }
+        assert_eq!(entries(&log.take(Vec::new()).unwrap().bytes, 0), [read]);
+        let lost = log.lost();
+        assert!(lost > MOST as u64, "{lost}");
+        let then = log.take(Vec::new()).unwrap();
+        assert_eq!(entries(&then.bytes, 0), [Entry::Lost { bytes: lost }]);
+    }
+}
