@@ -38,6 +38,7 @@ chores:
   bench train         the time of a training step and of a model
   campaign gripper    the gripper's long campaigns: rates beside the glove, cut wires; minutes
   campaign glove      virtual persons in honest gloves: errors of ten minutes, what the checks find; minutes
+  campaign sessions   seeded sessions with faults replayed from their logs, writers killed; minutes
   campaign stalls     processes that stand still in motion, on the PC and in QEMU; minutes
   fuzz [--short]      the fuzz targets under cargo-fuzz, 10 minutes each (30 s with --short); where
                       there is no nightly compiler, on stable
@@ -73,6 +74,7 @@ fn main() -> ExitCode {
         ["campaign", "gripper"] => campaign::gripper(),
         ["campaign", "glove"] => campaign::glove(),
         ["campaign", "stalls"] => campaign::stalls(),
+        ["campaign", "sessions"] => step::run("sessions", &mut firmware::campaign("sessions")),
         ["fuzz"] => fuzz::run(fuzz::Length::Long),
         ["fuzz", "--short"] => fuzz::run(fuzz::Length::Short),
         ["docs"] => test::docs(),

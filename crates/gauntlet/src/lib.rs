@@ -14,6 +14,7 @@
 pub mod cli;
 pub mod commands;
 mod flat_hand;
+mod glove_log;
 mod heard;
 pub mod live;
 pub mod options;

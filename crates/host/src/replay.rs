@@ -5,7 +5,9 @@
 //! and [`compare`] says by how much its commands differ.
 
 use anyhow::Result;
-use bridge::trace::{Difference, GLOVE, GRIPPER, Look, Loose, Port, Source, Strict, settings};
+use bridge::trace::{
+    Difference, Entry, GLOVE, GRIPPER, Look, Loose, Port, Reader, Source, Strict, settings,
+};
 use bridge::{App, Board, Instant, Platform, Settings};
 use glove::calibration::Bound;
 use glove::sc18im::Sc18im;
@@ -143,12 +145,36 @@ fn run<S: Source>(
         )
         .into());
     }
+    if traced.is_scan() {
+        scan(source);
+        return Ok(());
+    }
     match traced.model.two_finger() {
         None => turns::<4, _>(source, traced, changes, follow, ThreeFinger::new),
         Some(model) => {
             let driver = move |line, config| TwoFinger::new(line, model, config);
             turns::<1, _>(source, traced, changes, follow, driver)
         }
+    }
+}
+
+/// As every session on a PC has it.
+fn scan_config() -> scan::Config {
+    scan::Config {
+        baud: BAUD,
+        ..scan::Config::default()
+    }
+}
+
+/// A glove that was read by itself: only what is written to it can be compared.
+fn scan<S: Source>(source: &S) {
+    let config = scan_config();
+    let mut scanner = Scanner::new(Port::new(source, GLOVE), config).with_set_baud();
+    while !source.is_over() {
+        let now = source.now();
+        // What became of the sensors is in the next writes.
+        let _ = scanner.poll(now);
+        source.wait_until(scanner.next_due().unwrap_or(now));
     }
 }
 
@@ -173,10 +199,7 @@ where
             "a value in its range",
         )
     })?;
-    let scan = scan::Config {
-        baud: BAUD,
-        ..scan::Config::default()
-    };
+    let scan = scan_config();
     let bus = Scanner::new(Port::new(source, GLOVE), scan).with_set_baud();
     let scanner = BusScanner::on(bus.into_bus(), scan);
     let gripper = driver(Port::new(source, GRIPPER), traced.home.driver());
@@ -206,5 +229,48 @@ where
         }
         let due = app.step();
         app.platform_mut().wait_until(due);
+    }
+}
+
+/// What went over a log's line to the gripper.
+#[derive(Debug, Clone, Default, PartialEq, Eq)]
+pub struct GripperLine {
+    /// When something was written, µs, and what.
+    pub requests: Vec<(u64, Vec<u8>)>,
+    /// Where the gripper stood at last, counts; `None` where it never said.
+    pub positions: Option<Vec<u8>>,
+}
+
+/// What went over the line to the gripper, and where the gripper stood at last.
+pub fn gripper_line(traced: &Traced) -> GripperLine {
+    let mut line = GripperLine::default();
+    let mut reader = Reader::new(&traced.bytes);
+    while let Ok(Some(entry)) = reader.read() {
+        if let Entry::Write {
+            port: GRIPPER,
+            bytes,
+        } = entry
+        {
+            line.requests.push((reader.at(), bytes.to_vec()));
+        }
+    }
+    let mut stood = Stood(None);
+    // A log that cannot be replayed is told elsewhere.
+    if same(traced, &mut stood).is_ok() {
+        line.positions = stood.0;
+    }
+    line
+}
+
+struct Stood(Option<Vec<u8>>);
+
+impl Follow for Stood {
+    fn turn<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>, _: u64) -> bool {
+        if let Some(status) = &app.telemetry().status {
+            let stood = self.0.get_or_insert_default();
+            stood.clear();
+            stood.extend_from_slice(&status.position);
+        }
+        true
     }
 }

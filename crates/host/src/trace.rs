@@ -16,8 +16,10 @@ pub const PROGRAM: &str = concat!("gauntlet ", env!("CARGO_PKG_VERSION"));
 
 /// Bytes of a trace that may wait.
 pub const MOST: usize = 4 << 20;
-/// Room from the start: more than half a second.
-const USUAL: usize = 64 << 10;
+/// A block that has so many bytes is full.
+const BLOCK: usize = 32 << 10;
+/// Room of a block from the start.
+const USUAL: usize = 40 << 10;
 
 /// What a PC's bridge says of itself at the start of its trace: a replay makes the same one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -72,11 +74,9 @@ impl Home {
         }
     }
 
-    /// Of a trace that does not say.
+    /// Of a home that has no gripper, or does not say.
     pub fn unknown() -> Self {
-        let mut home = Self::new("3f", false, &gripper::driver::Config::for_pc(), true);
-        home.program.clear();
-        home
+        Self::new("3f", false, &gripper::driver::Config::for_pc(), true)
     }
 
     /// How the gripper's driver was set up.
@@ -95,34 +95,6 @@ impl Home {
     }
 }
 
-/// Bytes that wait for the writer.
-#[derive(Debug)]
-struct Waiting {
-    bytes: Vec<u8>,
-    /// Time of the clock's newest reading before the first of them, and of the newest one, µs.
-    since: u64,
-    at: u64,
-    /// Bytes for which there was no room since the last block.
-    missing: u64,
-    lost: u64,
-    /// Nobody takes them any more.
-    closed: bool,
-}
-
-impl Sink for Waiting {
-    fn put(&mut self, head: &[u8], body: &[u8]) {
-        let length = head.len() + body.len();
-        // A trace with a hole goes on with a block of its own.
-        if self.closed || self.missing > 0 || self.bytes.len() + length > MOST {
-            self.missing += length as u64;
-            self.lost += length as u64;
-            return;
-        }
-        self.bytes.extend_from_slice(head);
-        self.bytes.extend_from_slice(body);
-    }
-}
-
 /// A part of a trace: whole entries.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Block {
@@ -134,6 +106,49 @@ pub struct Block {
     pub bytes: Vec<u8>,
 }
 
+impl Block {
+    fn new(since: u64) -> Self {
+        Self {
+            since,
+            at: since,
+            bytes: Vec::with_capacity(USUAL),
+        }
+    }
+}
+
+/// Bytes that wait for the writer.
+#[derive(Debug)]
+struct Waiting {
+    full: Vec<Block>,
+    newest: Block,
+    /// Bytes in all of them.
+    bytes: usize,
+    /// Bytes for which there was no room since somebody took blocks.
+    missing: u64,
+    lost: u64,
+    /// Nobody takes them any more.
+    closed: bool,
+}
+
+impl Sink for Waiting {
+    fn put(&mut self, head: &[u8], body: &[u8]) {
+        let length = head.len() + body.len();
+        // Behind a hole nothing could be replayed.
+        if self.closed || self.missing > 0 || self.bytes + length > MOST {
+            self.missing += length as u64;
+            self.lost += length as u64;
+            return;
+        }
+        if self.newest.bytes.len() >= BLOCK {
+            let next = Block::new(self.newest.at);
+            self.full.push(std::mem::replace(&mut self.newest, next));
+        }
+        self.newest.bytes.extend_from_slice(head);
+        self.newest.bytes.extend_from_slice(body);
+        self.bytes += length;
+    }
+}
+
 /// Where a bridge's trace is written, or nowhere. Clones write the same one.
 #[derive(Debug, Clone, Default)]
 pub struct TraceLog(Option<Arc<Mutex<Recorder<Waiting>>>>);
@@ -142,9 +157,9 @@ impl TraceLog {
     /// An empty trace.
     pub fn new() -> Self {
         let waiting = Waiting {
-            bytes: Vec::with_capacity(USUAL),
-            since: 0,
-            at: 0,
+            full: Vec::new(),
+            newest: Block::new(0),
+            bytes: 0,
             missing: 0,
             lost: 0,
             closed: false,
@@ -172,31 +187,36 @@ impl TraceLog {
         }
     }
 
+    /// The beginning of a trace of a glove that is read by itself: nothing is made of it.
+    pub fn begin_scan(&self) {
+        self.note(&Entry::Head { axes: 0 });
+        let home = serde_json::to_vec(&Home::unknown()).unwrap_or_default();
+        let part = Part::Home;
+        self.note(&Entry::Part { part, bytes: &home });
+    }
+
     fn lock(&self) -> Option<MutexGuard<'_, Recorder<Waiting>>> {
         // Nothing panics while holding it; a poisoned lock still holds whole entries.
         let recorder = self.0.as_ref()?;
         Some(recorder.lock().unwrap_or_else(PoisonError::into_inner))
     }
 
-    /// What waits, in exchange for an empty `spare`; `None` where nothing does.
-    pub fn take(&self, mut spare: Vec<u8>) -> Option<Block> {
-        spare.clear();
-        let mut recorder = self.lock()?;
-        let waiting = recorder.sink_mut();
-        if waiting.bytes.is_empty() && waiting.missing == 0 {
-            return None;
-        }
-        let missing = std::mem::take(&mut waiting.missing);
-        let block = Block {
-            since: waiting.since,
-            at: waiting.at,
-            bytes: std::mem::replace(&mut waiting.bytes, spare),
+    /// What waits.
+    pub fn take(&self) -> Vec<Block> {
+        let Some(mut recorder) = self.lock() else {
+            return Vec::new();
         };
-        waiting.since = waiting.at;
+        let waiting = recorder.sink_mut();
+        let mut blocks = std::mem::take(&mut waiting.full);
+        let next = Block::new(waiting.newest.at);
+        blocks.push(std::mem::replace(&mut waiting.newest, next));
+        blocks.retain(|block| !block.bytes.is_empty());
+        waiting.bytes = 0;
+        let missing = std::mem::take(&mut waiting.missing);
         if missing > 0 {
             recorder.note(&Entry::Lost { bytes: missing });
         }
-        Some(block)
+        blocks
     }
 
     /// Nothing is taken any more: nothing need wait.
@@ -204,7 +224,8 @@ impl TraceLog {
         if let Some(mut recorder) = self.lock() {
             let waiting = recorder.sink_mut();
             waiting.closed = true;
-            waiting.bytes = Vec::new();
+            waiting.full = Vec::new();
+            waiting.newest.bytes = Vec::new();
         }
     }
 
@@ -228,7 +249,7 @@ impl Note for TraceLog {
     fn clock(&self, at: Instant) {
         if let Some(mut recorder) = self.lock() {
             recorder.clock(at);
-            recorder.sink_mut().at = at.as_ticks();
+            recorder.sink_mut().newest.at = at.as_ticks();
         }
     }
 }
@@ -252,18 +273,18 @@ mod tests {
             bytes: &[1, 2, 3],
         };
         log.note(&read);
-        let first = log.take(Vec::new()).unwrap();
+        let first = log.take().remove(0);
         log.waited();
         log.clock(Instant::from_ticks(1_500));
-        let second = log.take(Vec::new()).unwrap();
-        assert_eq!(log.take(Vec::new()), None);
+        let second = log.take().remove(0);
+        assert_eq!(log.take(), []);
         assert_eq!((first.since, first.at), (0, 1_000));
         assert_eq!((second.since, second.at), (1_000, 1_500));
         let turn = |at| Entry::Clock { turn: true, at };
         assert_eq!(entries(&first.bytes, 0), [turn(1_000), read]);
         assert_eq!(entries(&second.bytes, 1_000), [turn(1_500)]);
         TraceLog::default().note(&read);
-        assert_eq!(TraceLog::default().take(Vec::new()), None);
+        assert_eq!(TraceLog::default().take(), []);
     }
 
     #[test]
@@ -277,10 +298,10 @@ mod tests {
         for _ in 0..3 {
             log.note(&read);
         }
-        assert_eq!(entries(&log.take(Vec::new()).unwrap().bytes, 0), [read]);
+        assert_eq!(entries(&log.take().remove(0).bytes, 0), [read]);
         let lost = log.lost();
         assert!(lost > MOST as u64, "{lost}");
-        let then = log.take(Vec::new()).unwrap();
+        let then = log.take().remove(0);
         assert_eq!(entries(&then.bytes, 0), [Entry::Lost { bytes: lost }]);
     }
 }

@@ -98,7 +98,7 @@ impl<'t> Times<'t> {
 
     /// Time goes on to what is due or to the next bytes, whichever is first.
     fn next_bytes(&mut self, due: u64) {
-        let now = self.now + STEP;
+        let now = self.now.saturating_add(STEP);
         let mut until = due;
         loop {
             let before = self.ahead;
@@ -113,7 +113,7 @@ impl<'t> Times<'t> {
             }
         }
         self.now = now.max(until);
-        self.over = self.now > self.end + AFTERGLOW;
+        self.over = self.now > self.end.saturating_add(AFTERGLOW);
     }
 
     /// The entry at `reader` that has come, for a cursor that looks for its own.

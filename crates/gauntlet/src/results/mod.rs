@@ -9,6 +9,7 @@ pub mod devices;
 pub mod gloves;
 pub mod maps;
 pub mod paper;
+pub mod replays;
 pub mod runs;
 pub mod settings;
 

@@ -83,8 +83,8 @@ pub(super) struct LogFile {
     file: File,
     ids: [u16; CHANNELS.len()],
     sequence: [u32; CHANNELS.len()],
-    /// The trace's channel, its next number, and an empty block's memory.
-    trace: (u16, u32, Vec<u8>),
+    /// The trace's channel, and its next number.
+    trace: (u16, u32),
     /// Log time of the newest message: it never goes back, and is never 0.
     newest: u64,
     clock: Clock,
@@ -146,7 +146,7 @@ impl LogFile {
             file,
             ids,
             sequence: [0; CHANNELS.len()],
-            trace: (trace, 0, Vec::new()),
+            trace: (trace, 0),
             newest: 1,
             clock,
             written: Whole::default(),
@@ -219,9 +219,7 @@ impl LogFile {
         };
         self.sequence[index] = self.sequence[index].wrapping_add(1);
         self.writer.write_to_known_channel(&header, text)?;
-        self.written.messages += 1;
-        let (first, last) = self.written.span.unwrap_or((at, at));
-        self.written.span = Some((first.min(at), last.max(at)));
+        self.count(at);
         Ok(())
     }
 
@@ -231,24 +229,35 @@ impl LogFile {
         self.newest
     }
 
-    /// Writes what waits of the trace as one message.
+    /// Writes what waits of the trace, a message a block.
     fn write_trace(&mut self, records: &Records) -> McapResult<()> {
-        let Some(block) = records.trace.take(std::mem::take(&mut self.trace.2)) else {
-            return Ok(());
-        };
-        let at = self.clock.wall_ns(Moment::from_ticks(block.at));
-        let header = MessageHeader {
-            channel_id: self.trace.0,
-            sequence: self.trace.1,
-            log_time: self.log_time(at),
-            publish_time: at,
-        };
-        self.trace.1 = self.trace.1.wrapping_add(1);
-        let mut message = [block.since, block.at].map(u64::to_le_bytes).concat();
-        message.extend_from_slice(&block.bytes);
-        self.trace.2 = block.bytes;
-        self.writer.write_to_known_channel(&header, &message)?;
+        let blocks = records.trace.take();
+        for (number, block) in blocks.iter().enumerate() {
+            if number > 0 {
+                // Those of the bring-up come all at once.
+                self.close_chunk()?;
+            }
+            let at = self.clock.wall_ns(Moment::from_ticks(block.at));
+            let header = MessageHeader {
+                channel_id: self.trace.0,
+                sequence: self.trace.1,
+                log_time: self.log_time(at),
+                publish_time: at,
+            };
+            self.trace.1 = self.trace.1.wrapping_add(1);
+            let mut message = [block.since, block.at].map(u64::to_le_bytes).concat();
+            message.extend_from_slice(&block.bytes);
+            self.writer.write_to_known_channel(&header, &message)?;
+            self.count(at);
+        }
         Ok(())
+    }
+
+    /// One more message, of `at`.
+    fn count(&mut self, at: u64) {
+        self.written.messages += 1;
+        let (first, last) = self.written.span.unwrap_or((at, at));
+        self.written.span = Some((first.min(at), last.max(at)));
     }
 
     fn close_chunk(&mut self) -> McapResult<()> {

@@ -70,6 +70,11 @@ impl Blocks {
 }
 
 impl Traced {
+    /// Whether a glove was read by itself: there was no bridge.
+    pub fn is_scan(&self) -> bool {
+        self.image.is_empty()
+    }
+
     /// Reads the log at `path`.
     ///
     /// # Errors

@@ -24,6 +24,7 @@ use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 use crate::lines::port::{BAUD, Port, Watch};
 use crate::realtime;
+use crate::trace::TraceLog;
 
 pub use bringup::{BringUp, open};
 pub use hand::{Flat, Hand, Pose};
@@ -37,12 +38,14 @@ pub const QUEUE: usize = 256;
 const LOOK: Duration = Duration::from_millis(20);
 
 /// How a glove is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Settings {
     /// How it is wired and run. `baud` must be what the port is opened with.
     pub scan: scan::Config,
     /// Frames that may wait to be taken, 1 at least.
     pub queue: usize,
+    /// Where the port's bytes go, with the instants at which they were read and written.
+    pub trace: TraceLog,
 }
 
 impl Default for Settings {
@@ -53,6 +56,7 @@ impl Default for Settings {
                 ..scan::Config::default()
             },
             queue: QUEUE,
+            trace: TraceLog::default(),
         }
     }
 }
@@ -83,6 +87,7 @@ impl Scanning {
         let worker = worker::Worker::new(
             port,
             settings.scan,
+            settings.trace,
             clock,
             interrupt,
             hand,

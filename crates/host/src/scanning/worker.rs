@@ -5,6 +5,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::SyncSender;
 
 use bridge::Platform;
+use bridge::trace::{GLOVE, Tapped};
 use glove::scan::{Config, Scanner};
 use glove::{Duration, Instant};
 
@@ -14,6 +15,7 @@ use crate::clock::{Clock, since};
 use crate::interrupt::Interrupt;
 use crate::lines::Pc;
 use crate::lines::port::Port;
+use crate::trace::TraceLog;
 
 /// The longest wait: an end is heard within it.
 const LONGEST: Duration = Duration::from_millis(20);
@@ -22,7 +24,7 @@ const SAY: Duration = Duration::from_millis(50);
 
 pub(super) struct Worker {
     pc: Pc,
-    scanner: Scanner<Port>,
+    scanner: Scanner<Tapped<Port, TraceLog>>,
     hand: SyncSender<Scanned>,
     shared: Arc<Shared>,
     said: Option<Instant>,
@@ -32,13 +34,17 @@ impl Worker {
     pub fn new(
         port: Port,
         config: Config,
+        trace: TraceLog,
         clock: Clock,
         interrupt: &Interrupt,
         hand: SyncSender<Scanned>,
         shared: Arc<Shared>,
     ) -> Self {
+        trace.begin_scan();
+        let pc = Pc::new(clock, [port.watch()], interrupt.clone());
+        let port = Tapped::new(port, GLOVE, trace.clone());
         Self {
-            pc: Pc::new(clock, [port.watch()], interrupt.clone()),
+            pc: pc.traced(trace),
             scanner: Scanner::new(port, config).with_set_baud(),
             hand,
             shared,

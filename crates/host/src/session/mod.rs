@@ -54,7 +54,7 @@ pub use in_process::{Driving, InProcess, Parts};
 pub use numbers::Progress;
 pub use on_chip::OnChip;
 pub use orders::{Order, Orders};
-pub use replayed::Replayed;
+pub use replayed::{Outcome, Replayed};
 pub use snapshot::Snapshot;
 pub use stopped::Stopped;
 pub use stored::check_image;

@@ -1,5 +1,6 @@
 //! A session's log replayed as a session that somebody watches, at its own pace or another.
 
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -9,7 +10,6 @@ use bridge::{App, Board};
 use super::Session;
 use super::hub::Hub;
 use super::orders::{Order, Orders, Queue};
-use super::record::Feed;
 use super::stopped::Stopped;
 use super::worker::Worker;
 use crate::clock::Clock;
@@ -22,10 +22,27 @@ use crate::replay::{self, Follow, Same};
 /// Longest sleep between two looks whether the end was ordered.
 const LOOK: Duration = Duration::from_millis(20);
 
+/// How a replay went, once it is over.
+#[derive(Debug, Clone, Default)]
+pub struct Outcome(Arc<Mutex<Option<Result<Same>>>>);
+
+impl Outcome {
+    fn lock(&self) -> MutexGuard<'_, Option<Result<Same>>> {
+        // Nothing panics while holding it.
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// How it went; `None` before its end, and once it was taken.
+    pub fn take(&self) -> Option<Result<Same>> {
+        self.lock().take()
+    }
+}
+
 /// A log being replayed.
 #[derive(Debug)]
 pub struct Replayed {
-    thread: Option<JoinHandle<Result<Same>>>,
+    thread: Option<JoinHandle<()>>,
+    outcome: Outcome,
     orders: Orders,
     hub: Hub,
 }
@@ -35,7 +52,7 @@ struct Told {
     worker: Worker,
     orders: Queue,
     started: Instant,
-    speed: Option<f64>,
+    speed: f64,
 }
 
 impl Follow for Told {
@@ -48,8 +65,7 @@ impl Follow for Told {
                     return false;
                 }
             }
-            let due = self.speed.map(|speed| at as f64 * 1e-6 / speed);
-            let due = Duration::from_secs_f64(due.unwrap_or(0.0));
+            let due = Duration::from_secs_f64(at as f64 * 1e-6 / self.speed);
             let left = due.saturating_sub(self.started.elapsed());
             if left.is_zero() {
                 return true;
@@ -60,49 +76,51 @@ impl Follow for Told {
 }
 
 impl Replayed {
-    /// Replays `traced` with its own bridge, `speed` times as fast as it was; as fast as it goes where none is said. What
-    /// happens is handed to `feed`, too.
+    /// Replays `traced` with its own bridge, `speed` times as fast as it was.
     ///
     /// # Errors
     /// A failure where the system gives no thread.
-    pub fn start(
-        traced: Traced,
-        speed: Option<f64>,
-        clock: Clock,
-        feed: Option<Feed>,
-    ) -> Result<Self> {
+    pub fn start(traced: Traced, speed: f64, clock: Clock) -> Result<Self> {
         let (orders, queue) = Orders::queue(clock);
         let (_, none) = Orders::queue(clock);
         let hub = Hub::default();
         let mut told = Told {
-            worker: Worker::new(none, hub.clone(), feed),
+            worker: Worker::new(none, hub.clone(), None),
             orders: queue,
             started: Instant::now(),
-            speed: speed.filter(|speed| *speed > 0.0),
+            speed: speed.max(0.01),
+        };
+        let outcome = Outcome::default();
+        let place = outcome.clone();
+        let replay = move || {
+            let same = replay::same(&traced, &mut told);
+            *place.lock() = Some(same);
         };
         let thread = std::thread::Builder::new()
             .name("replay".to_owned())
-            .spawn(move || replay::same(&traced, &mut told))
+            .spawn(replay)
             .or_fail(
                 || "the replay cannot start".to_owned(),
                 "ending other programs",
             )?;
         Ok(Self {
             thread: Some(thread),
+            outcome,
             orders,
             hub,
         })
     }
 
-    /// Ends it, and how it went. Once.
-    ///
-    /// # Errors
-    /// What ended it.
-    pub fn end(&mut self) -> Result<Same> {
+    /// Where it will be said how it went.
+    pub fn result(&self) -> Outcome {
+        self.outcome.clone()
+    }
+
+    fn end(&mut self) -> Result<()> {
         self.orders.give(Order::Stop);
         match self.thread.take().map(JoinHandle::join) {
-            Some(Ok(same)) => same,
-            Some(Err(_)) | None => Err(Failure::new(
+            Some(Ok(())) | None => Ok(()),
+            Some(Err(_)) => Err(Failure::new(
                 "the replay stopped on a fault of its own",
                 "the same without --speed, and report what it says",
             )
@@ -135,12 +153,12 @@ impl Session for Replayed {
 
     fn ended(&mut self) -> anyhow::Error {
         match self.end() {
-            Ok(_) => anyhow::anyhow!("the log is replayed"),
+            Ok(()) => anyhow::anyhow!("the log is replayed"),
             Err(error) => error,
         }
     }
 
     fn stop(&mut self) -> Result<Stopped> {
-        self.end().map(|_| Stopped::Untouched)
+        self.end().map(|()| Stopped::Untouched)
     }
 }

@@ -16,6 +16,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::UniqueId;
 
 use crate::commands::bridge::flat_pose;
+use crate::glove_log::GloveLog;
 use crate::outputs::{self, Kind};
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
@@ -93,7 +94,8 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
     if let Some(out) = &options.out {
         outputs::check(out, Kind::Profile, &[])?;
     }
-    let (source, missing) = place.open(&tell, interrupt)?;
+    let mut log = GloveLog::new(options.log.as_deref())?;
+    let (source, missing) = place.open(&tell, &mut log, interrupt)?;
     if missing > 0 {
         let what = format!(
             "the glove on {} lacks sensors, and a calibration needs all 16",
@@ -112,6 +114,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
     let mut session = Session::new(source, leading, person);
     let led = session.lead(&tell, interrupt);
     let mut done = session.finish();
+    let logged = log.finish(&tell);
     let link = done.link.take();
     let mut kept = None;
     let decided = led.and_then(|led| match led {
@@ -161,7 +164,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
         tell.say(format_args!("profile    {}", path.display()));
         tell.say(format_args!("next       {next}"));
     }
-    let (judgement, failure) = results::judged(decided);
+    let (judgement, failure) = results::judged(decided.and(logged));
     if options.json {
         results::print(
             "calibrate",

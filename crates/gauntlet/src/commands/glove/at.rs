@@ -16,6 +16,7 @@ use host::lines::list;
 use host::lines::port::BAUD;
 use host::next::Command;
 use host::scanning::{self, BringUp, Hand, Scanning, Settings};
+use host::trace::TraceLog;
 
 /// Where the glove is, and what is known of it.
 #[derive(Debug, Clone, Args)]
@@ -55,9 +56,10 @@ impl GloveAt {
         &self,
         tell: &Tell,
         clock: Clock,
+        trace: TraceLog,
         interrupt: &Interrupt,
     ) -> Result<Opened> {
-        let (scanning, missing) = self.read(tell, clock, interrupt)?;
+        let (scanning, missing) = self.read(tell, clock, trace, interrupt)?;
         let hand = self.known(&scanning, tell)?;
         Ok(Opened {
             scanning,
@@ -74,17 +76,22 @@ impl GloveAt {
         &self,
         tell: &Tell,
         clock: Clock,
+        trace: TraceLog,
         interrupt: &Interrupt,
     ) -> Result<(Scanning, usize)> {
         let place = self.glove.display();
         if let Some(warning) = list::latency_warning(&self.glove) {
             tell.say(format_args!("warning: {place}: {warning}"));
         }
+        let settings = Settings {
+            trace,
+            ..Settings::default()
+        };
         let BringUp {
             scanning,
             switched,
             missing,
-        } = scanning::open(&self.glove, Settings::default(), clock, interrupt)?;
+        } = scanning::open(&self.glove, settings, clock, interrupt)?;
         if let Some(baud) = switched {
             let why = match baud {
                 9_600 => "as after power-on",
