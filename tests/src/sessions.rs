@@ -147,6 +147,8 @@ impl World {
         let mut give = |order: Order<'_>| trace.give(&order, app);
         if self.mend.is_some_and(|mend| now >= mend) {
             self.mend = None;
+            // A gripper that was off must be activated again.
+            self.activated = false;
             self.lines.iter().for_each(|line| line.cut(false));
             self.wires.iter().for_each(|wire| wire.unplug(false));
             self.gripper.power(true);
