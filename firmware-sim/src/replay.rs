@@ -132,14 +132,24 @@ impl<'s, S: Source, L: Note + Copy, F: Slot, R: Gripper<AXES>> Replay<'s, S, L, 
 
     /// The part of a turn that comes after the loop's step: the host, what the bridge made of it, the wait.
     pub fn rest(&mut self, due: Instant) -> Outcome {
+        let outcome = self.serve();
+        self.end_turn(due);
+        outcome
+    }
+
+    /// The host.
+    pub fn serve(&mut self) -> Outcome {
         let now = self.app.platform_mut().now();
-        let outcome = self.server.poll(now, &mut self.app);
+        self.server.poll(now, &mut self.app)
+    }
+
+    /// What the bridge made of the turn, and the wait.
+    pub fn end_turn(&mut self, due: Instant) {
         if let Some(seen) = self.look.look(self.app.telemetry()) {
             self.source.see(seen);
             self.log.note(&Entry::Seen(seen));
         }
         self.app.platform_mut().wait_until(due);
-        outcome
     }
 }
 

@@ -14,8 +14,8 @@
 pub mod cli;
 pub mod commands;
 mod flat_hand;
-mod glove_log;
 mod heard;
+mod line_log;
 pub mod live;
 pub mod options;
 pub mod out;

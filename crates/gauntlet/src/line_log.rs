@@ -1,4 +1,5 @@
-//! The log of a glove that is read by itself, by `record` and `calibrate`: what went over its port.
+//! The log of one line: of a glove that is read by itself, by `record` and `calibrate`, or of a bridge that is watched, by
+//! `bridge monitor`.
 
 use std::path::{Path, PathBuf};
 
@@ -13,14 +14,14 @@ use host::trace::TraceLog;
 
 /// Where it goes, if anywhere.
 #[derive(Debug, Default)]
-pub struct GloveLog {
+pub struct LineLog {
     path: PathBuf,
     feed: Option<Feed>,
     records: Option<Records>,
     log: Option<SessionLog>,
 }
 
-impl GloveLog {
+impl LineLog {
     /// A log at `path`, which is made once the glove is up; what comes before waits.
     ///
     /// # Errors

@@ -138,12 +138,16 @@ fn run<S: Source>(
     changes: &Changes,
     follow: &mut impl Follow,
 ) -> Result<()> {
-    if traced.home.glove != "serial" {
-        return Err(Failure::new(
-            "the log's glove was on an I²C port, whose bytes a log does not hold",
-            "a log of a glove on a serial port",
-        )
-        .into());
+    let why = match traced.home.glove.as_str() {
+        "serial" => None,
+        "chip" => Some(
+            "the log is of a bridge on a chip: it holds what that told and was told, and not what came over its ports",
+        ),
+        _ => Some("the log's glove was on an I²C port, whose bytes a log does not hold"),
+    };
+    if let Some(why) = why {
+        let next = "a log of teleop or demo with a glove on a serial port";
+        return Err(Failure::new(why, next).into());
     }
     if traced.is_scan() {
         scan(source);

@@ -28,7 +28,7 @@ pub struct Home {
     pub program: String,
     /// Which gripper: `3f`, `2f85`, `2f140` or `hande`.
     pub gripper_model: String,
-    /// The way to the glove: `serial` or `i2c`.
+    /// The way to the glove: `serial`, `i2c`, or `chip` where a bridge on a chip was only talked to.
     pub glove: String,
     /// Whether the gripper is on a network.
     pub network: bool,
@@ -189,8 +189,21 @@ impl TraceLog {
 
     /// The beginning of a trace of a glove that is read by itself: nothing is made of it.
     pub fn begin_scan(&self) {
+        self.begin_of("serial");
+    }
+
+    /// The beginning of a trace of the line to a bridge on a chip: what it tells and what it is told.
+    pub fn begin_monitor(&self) {
+        self.begin_of("chip");
+    }
+
+    fn begin_of(&self, glove: &str) {
         self.note(&Entry::Head { axes: 0 });
-        let home = serde_json::to_vec(&Home::unknown()).unwrap_or_default();
+        let home = Home {
+            glove: glove.to_owned(),
+            ..Home::unknown()
+        };
+        let home = serde_json::to_vec(&home).unwrap_or_default();
         let part = Part::Home;
         self.note(&Entry::Part { part, bytes: &home });
     }

@@ -13,7 +13,7 @@ use bridge::hae::image::Verifier;
 use bridge::posture::Posture;
 use bridge::protocol::Outcome;
 use bridge::supervisor::{Hand, Inputs, Supervisor, Weights};
-use bridge::trace::{Loose, Source, Strict};
+use bridge::trace::{GLOVE, GRIPPER, HOST, Loose, Source};
 use bridge::{Clutch, Config, Instant, State, glove};
 use core::cell::Cell;
 use core::fmt::Write;
@@ -213,19 +213,28 @@ impl<const X: usize, R: Gripper<X>> Gripper<X> for Counted<'_, R> {
     }
 }
 
+/// Finds what came in this turn: the trace's work, and not that of what is counted.
+fn find(trace: &impl Source) {
+    for port in [HOST, GLOVE, GRIPPER] {
+        let _ = black_box(trace.ready(port));
+    }
+}
+
 /// The whole loop over the trace: request, reply, step without and with a frame, the rest of a turn.
 fn looped(trace: &[u8]) -> Option<[Most; 5]> {
     let (request, reply) = (Cell::default(), Cell::default());
-    let tape = Strict::new(trace);
+    let tape = Loose::new(trace);
     let mut replay = Replay::new(&tape, (), flash::slots(), |inner: ThreeFinger<_>| Counted {
         inner,
         request: &request,
         reply: &reply,
     });
     let [mut without, mut with, mut rest] = [Most::default(); 3];
+    replay.app.keep_profile(flash::profile_slots());
     let mut followed = false;
     while !replay.is_over() {
         let frames = replay.app.telemetry().frame_sequence;
+        find(&tape);
         let (instructions, due) = count(|| replay.app.step());
         let seen = replay.app.telemetry();
         followed |= seen.state == State::Following;
@@ -234,8 +243,9 @@ fn looped(trace: &[u8]) -> Option<[Most; 5]> {
         } else {
             with.see(instructions);
         }
-        let (instructions, outcome) = count(|| replay.rest(due));
+        let (instructions, outcome) = count(|| replay.serve());
         rest.see(instructions);
+        replay.end_turn(due);
         if outcome == Outcome::Reboot {
             break;
         }
@@ -254,6 +264,7 @@ fn scanned(trace: &[u8]) -> Option<[Most; 2]> {
     let [mut sample, mut angles] = [Most::default(); 2];
     while !tape.is_over() {
         let now = tape.now();
+        find(&tape);
         let good = scanner.counters().good;
         let (instructions, frame) = count(|| scanner.poll(now));
         if scanner.counters().good != good && frame.is_none() {
@@ -283,6 +294,7 @@ fn worn(trace: &[u8]) -> Option<[Most; 3]> {
     let (mut frames, mut sum) = (0, 0u64);
     while !tape.is_over() {
         let now = tape.now();
+        find(&tape);
         if let Some(frame) = scanner.poll(now) {
             if frames == 0 {
                 posture.set_profile(Some(&profile(scanner.ids())));

@@ -16,7 +16,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::UniqueId;
 
 use crate::commands::bridge::flat_pose;
-use crate::glove_log::GloveLog;
+use crate::line_log::LineLog;
 use crate::outputs::{self, Kind};
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
@@ -94,7 +94,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
     if let Some(out) = &options.out {
         outputs::check(out, Kind::Profile, &[])?;
     }
-    let mut log = GloveLog::new(options.log.as_deref())?;
+    let mut log = LineLog::new(options.log.as_deref())?;
     let (source, missing) = place.open(&tell, &mut log, interrupt)?;
     if missing > 0 {
         let what = format!(

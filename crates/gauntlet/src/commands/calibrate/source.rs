@@ -8,7 +8,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::UniqueId;
 
 use crate::commands::glove::GloveAt;
-use crate::glove_log::GloveLog;
+use crate::line_log::LineLog;
 use crate::results::gloves;
 use crate::tell::Tell;
 use host::calibration::virtual_person::VirtualPerson;
@@ -70,7 +70,7 @@ impl Place<'_> {
     pub fn open(
         &self,
         tell: &Tell,
-        log: &mut GloveLog,
+        log: &mut LineLog,
         interrupt: &Interrupt,
     ) -> Result<(Source, usize)> {
         let address = match self {

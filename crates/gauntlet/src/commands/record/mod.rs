@@ -10,7 +10,7 @@ use anyhow::Result;
 use clap::Args;
 
 use super::glove::{GloveAt, Opened, take_flat};
-use crate::glove_log::GloveLog;
+use crate::line_log::LineLog;
 use crate::options::{log_name, run_time};
 use crate::outputs;
 use crate::results::{self, gloves, runs};
@@ -58,7 +58,7 @@ pub struct Record {
 pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.at.json);
     outputs::check_new(&options.out, "a recording")?;
-    let mut log = GloveLog::new(options.log.as_deref())?;
+    let mut log = LineLog::new(options.log.as_deref())?;
     let clock = Clock::start();
     let Opened {
         mut scanning,
