@@ -6,7 +6,7 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use bridge::trace::{Entry, GLOVE, Note};
 use host::clock::Clock;
-use host::recording::{QUEUE, SessionLog, reader};
+use host::recording::{QUEUE, SessionLog, salvage};
 use host::session::record::queue;
 
 /// What the child is called with.
@@ -53,7 +53,7 @@ pub fn kill_after(time: Duration, path: &Path) -> Option<f64> {
     child.wait().expect("it ends");
     let file = std::fs::read(path).expect("the log");
     let mut newest = 0;
-    let found = reader::read(&file, |message| newest = newest.max(message.log_time)).ok()?;
+    let found = salvage::read(&file, |message| newest = newest.max(message.log_time)).ok()?;
     assert!(!found.finished);
     let killed = killed.duration_since(UNIX_EPOCH).expect("after 1970");
     (newest > 1).then(|| killed.as_secs_f64() - newest as f64 * 1e-9)

@@ -268,13 +268,9 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
     };
     let config = Config::new(settings).expect("settings in their ranges");
     let driver = gripper::driver::Config::for_pc();
-    trace.begin(
-        &Home::new("3f", false, &driver, true),
-        &settings,
-        &image,
-        None,
-    );
     let scan = scan::Config::default();
+    let home = Home::new("3f", false, &driver, &scan, true);
+    trace.begin(&home, &settings, &image, None);
     let bus = Scanner::new(Tapped::new(glove_line, GLOVE, trace.clone()), scan).with_set_baud();
     let mut app = App::new(
         Machine {

@@ -296,6 +296,31 @@ pub fn counts(trace: &[u8]) -> Counts {
     counts
 }
 
+/// The same trace with reads that follow each other in one: the host's line is read byte by byte. For replays that go by time.
+pub fn with_longer_reads(trace: &[u8]) -> Vec<u8> {
+    let log = Log::default();
+    let mut reader = Reader::new(trace);
+    let mut newest: Option<(u8, Vec<u8>)> = None;
+    loop {
+        let entry = reader.read().ok().flatten();
+        if let (Some(Entry::Read { port, bytes }), Some((of, all))) = (entry, &mut newest)
+            && port == *of
+        {
+            all.extend_from_slice(bytes);
+            continue;
+        }
+        if let Some((port, bytes)) = newest.take() {
+            let bytes = &bytes;
+            log.note(&Entry::Read { port, bytes });
+        }
+        match entry {
+            Some(Entry::Read { port, bytes }) => newest = Some((port, bytes.to_vec())),
+            Some(entry) => log.note(&entry),
+            None => return log.take(),
+        }
+    }
+}
+
 /// What virtual devices know of a trace: the bytes that came from them, and when. No instants of the loop.
 pub fn at_the_devices(trace: &[u8]) -> Vec<u8> {
     let log = Log::default();

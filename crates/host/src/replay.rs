@@ -4,23 +4,27 @@
 //! With another map, profile or other settings the bridge does something else: [`other`] gives it the bytes by their times,
 //! and [`compare`] says by how much its commands differ.
 
+use std::marker::PhantomData;
+
 use anyhow::Result;
 use bridge::trace::{
     Difference, Entry, GLOVE, GRIPPER, Look, Loose, Port, Reader, Source, Strict, settings,
 };
 use bridge::{App, Board, Instant, Platform, Settings};
 use glove::calibration::Bound;
-use glove::sc18im::Sc18im;
-use glove::scan::{self, BusScanner, Scanner};
+use glove::sc18im::{Sc18im, SerialPort};
+use glove::scan::{BusScanner, Scanner};
 use gripper::driver::{ThreeFinger, TwoFinger};
 
 use crate::failure::Failure;
-use crate::lines::port::BAUD;
 use crate::recording::traced::Traced;
 use crate::session::slots::MemorySlot;
 use crate::session::stored::stored;
 
 mod compared;
+mod echoed;
+
+use echoed::Echoed;
 
 pub use compared::{Apart, Compared, compare};
 
@@ -71,7 +75,8 @@ pub struct Same {
 /// A failure where no bridge can be made of what the log holds.
 pub fn same(traced: &Traced, follow: &mut impl Follow) -> Result<Same> {
     let strict = Strict::new(&traced.bytes);
-    run(&strict, traced, &Changes::default(), follow)?;
+    let gripper = Port::new(&strict, GRIPPER);
+    run(&strict, gripper, traced, &Changes::default(), follow)?;
     let cut = match (strict.damage(), strict.has_gap(), traced.gap) {
         (Some(damage), _, _) => Some(damage.to_string()),
         (None, true, _) => {
@@ -103,14 +108,15 @@ fn seconds(us: u64) -> f64 {
 /// # Errors
 /// As [`same`].
 pub fn other(traced: &Traced, changes: &Changes, follow: &mut impl Follow) -> Result<()> {
-    run(&Loose::new(&traced.bytes), traced, changes, follow)
+    let loose = Loose::new(&traced.bytes);
+    let gripper = Echoed::new(Port::new(&loose, GRIPPER));
+    run(&loose, gripper, traced, changes, follow)
 }
 
-/// The trace as a board.
-#[derive(Debug)]
-struct Home<'s, S>(&'s S);
+/// The trace as a board whose gripper is on a line `G`.
+struct Home<'s, S, G>(&'s S, PhantomData<G>);
 
-impl<S: Source> Platform for Home<'_, S> {
+impl<S: Source, G> Platform for Home<'_, S, G> {
     fn now(&mut self) -> Instant {
         self.0.now()
     }
@@ -120,20 +126,21 @@ impl<S: Source> Platform for Home<'_, S> {
     }
 }
 
-impl<'s, S: Source> Board<4> for Home<'s, S> {
+impl<'s, S: Source, G: SerialPort> Board<4> for Home<'s, S, G> {
     type Glove = Sc18im<Port<'s, S>>;
-    type Gripper = ThreeFinger<Port<'s, S>>;
+    type Gripper = ThreeFinger<G>;
     type Flash = MemorySlot;
 }
 
-impl<'s, S: Source> Board<1> for Home<'s, S> {
+impl<'s, S: Source, G: SerialPort> Board<1> for Home<'s, S, G> {
     type Glove = Sc18im<Port<'s, S>>;
-    type Gripper = TwoFinger<Port<'s, S>>;
+    type Gripper = TwoFinger<G>;
     type Flash = MemorySlot;
 }
 
-fn run<S: Source>(
+fn run<S: Source, G: SerialPort>(
     source: &S,
+    gripper: G,
     traced: &Traced,
     changes: &Changes,
     follow: &mut impl Follow,
@@ -150,29 +157,21 @@ fn run<S: Source>(
         return Err(Failure::new(why, next).into());
     }
     if traced.is_scan() {
-        scan(source);
+        scan(source, traced);
         return Ok(());
     }
     match traced.model.two_finger() {
-        None => turns::<4, _>(source, traced, changes, follow, ThreeFinger::new),
+        None => turns::<4, _, _>(source, gripper, traced, changes, follow, ThreeFinger::new),
         Some(model) => {
             let driver = move |line, config| TwoFinger::new(line, model, config);
-            turns::<1, _>(source, traced, changes, follow, driver)
+            turns::<1, _, _>(source, gripper, traced, changes, follow, driver)
         }
     }
 }
 
-/// As every session on a PC has it.
-fn scan_config() -> scan::Config {
-    scan::Config {
-        baud: BAUD,
-        ..scan::Config::default()
-    }
-}
-
 /// A glove that was read by itself: only what is written to it can be compared.
-fn scan<S: Source>(source: &S) {
-    let config = scan_config();
+fn scan<S: Source>(source: &S, traced: &Traced) {
+    let config = traced.home.scan.config();
     let mut scanner = Scanner::new(Port::new(source, GLOVE), config).with_set_baud();
     while !source.is_over() {
         let now = source.now();
@@ -182,15 +181,16 @@ fn scan<S: Source>(source: &S) {
     }
 }
 
-fn turns<'s, const X: usize, S: Source>(
+fn turns<'s, const X: usize, S: Source, G: SerialPort>(
     source: &'s S,
+    gripper: G,
     traced: &Traced,
     changes: &Changes,
     follow: &mut impl Follow,
-    driver: impl FnOnce(Port<'s, S>, gripper::driver::Config) -> <Home<'s, S> as Board<X>>::Gripper,
+    driver: impl FnOnce(G, gripper::driver::Config) -> <Home<'s, S, G> as Board<X>>::Gripper,
 ) -> Result<()>
 where
-    Home<'s, S>: Board<X, Glove = Sc18im<Port<'s, S>>, Flash = MemorySlot>,
+    Home<'s, S, G>: Board<X, Glove = Sc18im<Port<'s, S>>, Flash = MemorySlot>,
 {
     let image = changes.image.as_deref().unwrap_or(&traced.image);
     let store = stored(image, traced.model)?;
@@ -203,11 +203,11 @@ where
             "a value in its range",
         )
     })?;
-    let scan = scan_config();
+    let scan = traced.home.scan.config();
     let bus = Scanner::new(Port::new(source, GLOVE), scan).with_set_baud();
     let scanner = BusScanner::on(bus.into_bus(), scan);
-    let gripper = driver(Port::new(source, GRIPPER), traced.home.driver());
-    let mut app = App::new(Home(source), scanner, gripper, store, config);
+    let gripper = driver(gripper, traced.home.driver());
+    let mut app = App::new(Home(source, PhantomData), scanner, gripper, store, config);
     let profile = changes.profile.as_ref();
     if let Some(profile) = profile.or(traced.profile.as_ref()) {
         // The clutch is open.

@@ -8,6 +8,8 @@ use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use bridge::trace::{Entry, Note, Noted, Part, Recorder, Sink};
 use glove::calibration::Bound;
+use glove::imu::{self, Mode};
+use glove::scan;
 use gripper::Instant;
 use serde::{Deserialize, Serialize};
 
@@ -21,6 +23,56 @@ const BLOCK: usize = 32 << 10;
 /// Room of a block from the start.
 const USUAL: usize = 40 << 10;
 
+/// How a glove was read.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Scan {
+    /// Speed of the serial port at the start.
+    pub baud: u32,
+    /// Speed to which the serial bridge is raised.
+    pub raise_to: Option<u32>,
+    /// Whether each read is followed by its status.
+    pub status_checks: bool,
+    /// The serial bridge's clock registers.
+    pub clock_divider: Option<u8>,
+    /// Address of the multiplexer.
+    pub mux: u8,
+    /// Whether the sensors run the fusion with the magnetometer.
+    pub ndof: bool,
+    /// From one scan to the next at least, µs.
+    pub period_us: u64,
+}
+
+impl From<&scan::Config> for Scan {
+    fn from(config: &scan::Config) -> Self {
+        Self {
+            baud: config.baud,
+            raise_to: config.raise_to,
+            status_checks: config.status_checks,
+            clock_divider: config.clock_divider,
+            mux: config.mux,
+            ndof: config.imu.mode == Mode::Ndof,
+            period_us: config.period.as_ticks(),
+        }
+    }
+}
+
+impl Scan {
+    /// The scanner's configuration.
+    pub fn config(&self) -> scan::Config {
+        let usual = scan::Config::default();
+        let mode = if self.ndof { Mode::Ndof } else { Mode::Imu };
+        scan::Config {
+            baud: self.baud,
+            raise_to: self.raise_to,
+            status_checks: self.status_checks,
+            clock_divider: self.clock_divider,
+            mux: self.mux,
+            imu: imu::Config { mode, ..usual.imu },
+            period: gripper::Duration::from_ticks(self.period_us),
+        }
+    }
+}
+
 /// What a PC's bridge says of itself at the start of its trace: a replay makes the same one.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Home {
@@ -30,6 +82,8 @@ pub struct Home {
     pub gripper_model: String,
     /// The way to the glove: `serial`, `i2c`, or `chip` where a bridge on a chip was only talked to.
     pub glove: String,
+    /// How the glove was read.
+    pub scan: Scan,
     /// Whether the gripper is on a network.
     pub network: bool,
     /// The driver of the gripper's line: unit, baud, then times in µs.
@@ -56,12 +110,14 @@ impl Home {
         model: &str,
         network: bool,
         line: &gripper::driver::Config,
+        scan: &scan::Config,
         serial_glove: bool,
     ) -> Self {
         Self {
             program: PROGRAM.to_owned(),
             gripper_model: model.to_owned(),
             glove: if serial_glove { "serial" } else { "i2c" }.to_owned(),
+            scan: scan.into(),
             network,
             unit: line.unit,
             baud: line.baud,
@@ -76,7 +132,8 @@ impl Home {
 
     /// Of a home that has no gripper, or does not say.
     pub fn unknown() -> Self {
-        Self::new("3f", false, &gripper::driver::Config::for_pc(), true)
+        let line = gripper::driver::Config::for_pc();
+        Self::new("3f", false, &line, &scan::Config::default(), true)
     }
 
     /// How the gripper's driver was set up.
@@ -188,19 +245,20 @@ impl TraceLog {
     }
 
     /// The beginning of a trace of a glove that is read by itself: nothing is made of it.
-    pub fn begin_scan(&self) {
-        self.begin_of("serial");
+    pub fn begin_scan(&self, config: &scan::Config) {
+        self.begin_of("serial", config);
     }
 
     /// The beginning of a trace of the line to a bridge on a chip: what it tells and what it is told.
     pub fn begin_monitor(&self) {
-        self.begin_of("chip");
+        self.begin_of("chip", &scan::Config::default());
     }
 
-    fn begin_of(&self, glove: &str) {
+    fn begin_of(&self, glove: &str, scan: &scan::Config) {
         self.note(&Entry::Head { axes: 0 });
         let home = Home {
             glove: glove.to_owned(),
+            scan: scan.into(),
             ..Home::unknown()
         };
         let home = serde_json::to_vec(&home).unwrap_or_default();

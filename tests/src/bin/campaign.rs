@@ -227,7 +227,8 @@ fn counts() -> Result<String, String> {
     let bench = bench().ok_or("no chip to count on")?;
     let recorded = loop_tests::trace::short(1, false);
     let image = images::gentle(1);
-    let text = chip::run(&bench, chip::COUNT, &image, &recorded.trace, true)?;
+    let trace = trace::with_longer_reads(&recorded.trace);
+    let text = chip::run(&bench, chip::COUNT, &image, &trace, true)?;
     String::from_utf8(text).map_err(|error| error.to_string())
 }
 

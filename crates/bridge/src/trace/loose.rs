@@ -13,13 +13,23 @@ const STEP: u64 = 50;
 /// The loop goes on for so long after the last bytes of such a trace, µs.
 const AFTERGLOW: u64 = 300_000;
 
+/// Where a port reads.
+#[derive(Debug, Clone, Copy)]
+struct Line<'t> {
+    /// Behind the entry that is being read.
+    reader: Reader<'t>,
+    /// What is left of that entry.
+    rest: &'t [u8],
+    /// Where its last entry of this turn ends: looking further would be work for nothing.
+    limit: usize,
+}
+
 #[derive(Debug)]
 struct Times<'t> {
     now: u64,
     /// At the entry that begins the next turn; in a trace without turns at the first one that has not come yet.
     ahead: Reader<'t>,
-    /// Where each port reads, and how much of the entry there was taken.
-    ports: [(Reader<'t>, usize); PORTS],
+    ports: [Line<'t>; PORTS],
     orders: Reader<'t>,
     /// The trace's turns are the loop's; else its bytes only have times.
     turns: bool,
@@ -48,7 +58,11 @@ impl<'t> Loose<'t> {
         let times = Times {
             now: 0,
             ahead: start,
-            ports: [(start, 0); PORTS],
+            ports: [Line {
+                reader: start,
+                rest: &[],
+                limit: 0,
+            }; PORTS],
             orders: start,
             turns,
             end: reader.at(),
@@ -91,6 +105,11 @@ impl<'t> Times<'t> {
                     self.over |= !begun;
                     return;
                 }
+                Ok(Some(Entry::Read { port, .. })) => {
+                    if let Some(line) = self.ports.get_mut(usize::from(port)) {
+                        line.limit = self.ahead.offset();
+                    }
+                }
                 Ok(Some(_)) => {}
             }
         }
@@ -131,34 +150,29 @@ impl<'t> Times<'t> {
         entry
     }
 
-    /// What has come for `port` and was not taken; its cursor stands before it.
+    /// What has come for `port` and was not taken.
     fn waiting(&mut self, port: u8) -> &'t [u8] {
-        let Some(&(mut reader, taken)) = self.ports.get(usize::from(port)) else {
+        let Some(place) = self.ports.get(usize::from(port)) else {
             return &[];
         };
-        let mut taken = taken;
-        loop {
-            let before = reader;
-            let entry = self.come(&mut reader);
-            let rest = match entry {
-                None => break self.keep(port, before, taken, &[]),
-                Some(Entry::Read { port: of, bytes }) if of == port => {
-                    bytes.get(taken..).unwrap_or_default()
-                }
-                Some(_) => &[],
-            };
-            if !rest.is_empty() {
-                break self.keep(port, before, taken, rest);
+        if !place.rest.is_empty() {
+            return place.rest;
+        }
+        let mut line = *place;
+        while line.rest.is_empty() {
+            if self.turns && line.reader.offset() >= line.limit {
+                break;
             }
-            taken = 0;
+            match self.come(&mut line.reader) {
+                None => break,
+                Some(Entry::Read { port: of, bytes }) if of == port => line.rest = bytes,
+                Some(_) => {}
+            }
         }
-    }
-
-    fn keep(&mut self, port: u8, reader: Reader<'t>, taken: usize, rest: &'t [u8]) -> &'t [u8] {
         if let Some(place) = self.ports.get_mut(usize::from(port)) {
-            *place = (reader, taken);
+            *place = line;
         }
-        rest
+        line.rest
     }
 }
 
@@ -186,8 +200,8 @@ impl Source for Loose<'_> {
             *to = *from;
         }
         let count = waiting.len().min(buffer.len());
-        if let Some((_, taken)) = times.ports.get_mut(usize::from(port)) {
-            *taken += count;
+        if let Some(line) = times.ports.get_mut(usize::from(port)) {
+            line.rest = waiting.get(count..).unwrap_or_default();
         }
         Ok(count)
     }

@@ -12,7 +12,7 @@
 mod channels;
 mod file;
 pub mod poses;
-pub mod reader;
+pub mod salvage;
 pub mod traced;
 
 use std::path::{Path, PathBuf};

@@ -7,7 +7,7 @@ use bridge::trace::{Entry, Part, Reader};
 use glove::calibration::Bound;
 
 use super::file::{TRACE_ENCODING, TRACE_TOPIC};
-use super::reader::{self, Found};
+use super::salvage::{self, Found};
 use crate::failure::{Failure, OrFail};
 use crate::lines::Model;
 use crate::next::{Command, advice};
@@ -84,7 +84,7 @@ impl Traced {
         let record = "the log of a gauntlet demo --log or gauntlet teleop --log";
         let file = std::fs::read(path).or_fail(what, "a log that is there")?;
         let mut blocks = Blocks::default();
-        let found = reader::read(&file, |message| {
+        let found = salvage::read(&file, |message| {
             if message.channel.topic == TRACE_TOPIC && message.channel.encoding == TRACE_ENCODING {
                 blocks.version = message.channel.metadata.get("version").cloned();
                 blocks.take(message.data);

@@ -40,7 +40,7 @@ impl Worker {
         hand: SyncSender<Scanned>,
         shared: Arc<Shared>,
     ) -> Self {
-        trace.begin_scan();
+        trace.begin_scan(&config);
         let pc = Pc::new(clock, [port.watch()], interrupt.clone());
         let port = Tapped::new(port, GLOVE, trace.clone());
         Self {

@@ -139,7 +139,11 @@ impl InProcess {
         let line = parts.gripper.driver_config(parts.line);
         let network = matches!(parts.gripper, Line::Tcp(_));
         let serial = matches!(parts.glove, GloveLine::Serial(_));
-        let home = Home::new(parts.model.option(), network, &line, serial);
+        let scan = scan::Config {
+            baud: BAUD,
+            ..scan::Config::default()
+        };
+        let home = Home::new(parts.model.option(), network, &line, &scan, serial);
         trace.begin(
             &home,
             config.settings(),
@@ -151,10 +155,6 @@ impl InProcess {
         let (tell_scheduling, scheduling) = std::sync::mpsc::sync_channel(1);
         let start = move || {
             bridge.spawn(move || {
-                let scan = scan::Config {
-                    baud: BAUD,
-                    ..scan::Config::default()
-                };
                 let scanner = glove.scanner(scan, trace.clone());
                 let gripper = driver(traced(gripper, trace), line);
                 let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);

@@ -234,5 +234,5 @@ fn messages_of(file: &[u8], body: Range<usize>) -> Result<Range<usize>, String> 
 }
 
 #[cfg(test)]
-#[path = "reader_tests.rs"]
+#[path = "salvage_tests.rs"]
 mod tests;
