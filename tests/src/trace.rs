@@ -9,6 +9,7 @@ use std::rc::Rc;
 use crate::nor_slot::NorSlot;
 use bridge::protocol::message::{CHUNK, Call, Request, VERSION};
 use bridge::protocol::{Outcome, Server, frame};
+use bridge::trace::{Difference, Entry, Look, Note, Noted, Reader, Recorder, Sink, Strict, Tapped};
 use bridge::{App, Board, Config, Instant, Platform, State, WeightsStore};
 use crc::{CRC_32_ISO_HDLC, Crc};
 use embedded_io::{ErrorType, Read, ReadReady, Write};
@@ -24,7 +25,7 @@ use rig::{Clock, MemoryWire};
 
 use crate::bits::Pose;
 use crate::images;
-use crate::replay::{AXES, GLOVE, GRIPPER, HOST, Record};
+use crate::replay::{self, AXES, GLOVE, GRIPPER, HOST, Replay};
 use crate::wearer::Wearer;
 
 const CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
@@ -113,22 +114,16 @@ fn recorded(
     let log = Log::default();
     let gripper = VirtualGripper::new(rig::gripper::Config::default());
     let faults = faults(faulty);
-    let tap = |wire: MemoryWire, port: u8| Tap {
-        inner: Faulty::new(
-            wire,
-            &clock,
-            seed ^ u64::from(port),
-            Faults::default(),
-            faults,
-        ),
-        port,
-        clock: clock.clone(),
-        log: log.clone(),
+    log.note(&Entry::Head { axes: AXES as u8 });
+    let tap = |wire: MemoryWire, port: u8| {
+        let seed = seed ^ u64::from(port);
+        let faulty = Faulty::new(wire, &clock, seed, Faults::default(), faults);
+        Tapped::new(faulty, port, log.clone())
     };
     let glove_tap = tap(MemoryWire::new(&clock, glove, BAUD), GLOVE);
     let gripper_tap = tap(MemoryWire::new(&clock, gripper, BAUD), GRIPPER);
     let mut app = App::new(
-        Machine(clock.clone()),
+        Machine(clock.clone(), log.clone()),
         Scanner::new(glove_tap, glove::scan::Config::default()),
         ThreeFinger::new(gripper_tap, gripper::driver::Config::default()),
         WeightsStore::new(slots(), bridge::app::expected(AXES)),
@@ -136,18 +131,18 @@ fn recorded(
     );
     app.keep_profile(slots());
     let line = HostLine::default();
-    let mut server = Server::new(Tap {
-        inner: line.clone(),
-        port: HOST,
-        clock: clock.clone(),
-        log: log.clone(),
-    });
+    let mut server = Server::new(Tapped::new(line.clone(), HOST, log.clone()));
+    let mut look = Look::default();
     let end = ACTIVE + seconds * 1_000_000 + 500_000;
     while clock.now().as_ticks() < end {
         host.speak(clock.now().as_ticks(), &line);
         let due = app.step();
-        if server.poll(clock.now(), &mut app) == Outcome::Reboot {
+        let now = app.platform_mut().now();
+        if server.poll(now, &mut app) == Outcome::Reboot {
             break;
+        }
+        if let Some(seen) = look.look(app.telemetry()) {
+            log.note(&Entry::Seen(seen));
         }
         let due = due.min(Instant::from_ticks(host.due));
         app.platform_mut().wait_until(due);
@@ -155,7 +150,7 @@ fn recorded(
     let counters = app.telemetry().counters;
     assert_eq!(app.telemetry().state, State::Idle);
     Recorded {
-        trace: log.0.take().bytes,
+        trace: log.take(),
         following_frames: counters.following_frames,
         holds: counters.holds,
     }
@@ -172,11 +167,13 @@ fn faults(some: bool) -> Faults {
     }
 }
 
-struct Machine(Clock);
+struct Machine(Clock, Log);
 
 impl Platform for Machine {
     fn now(&mut self) -> Instant {
-        self.0.now()
+        let now = self.0.now();
+        self.1.clock(now);
+        now
     }
 
     fn wait_until(&mut self, due: Instant) {
@@ -184,80 +181,164 @@ impl Platform for Machine {
         if due > self.0.now() {
             self.0.wait_until(due);
         }
+        self.1.waited();
     }
 }
 
 impl Board<AXES> for Machine {
-    type Glove = glove::sc18im::Sc18im<Tap<Faulty<MemoryWire>>>;
-    type Gripper = ThreeFinger<Tap<Faulty<MemoryWire>>>;
+    type Glove = glove::sc18im::Sc18im<Tapped<Faulty<MemoryWire>, Log>>;
+    type Gripper = ThreeFinger<Tapped<Faulty<MemoryWire>, Log>>;
     type Flash = NorSlot;
 }
 
-#[derive(Clone, Default)]
-struct Log(Rc<RefCell<Records>>);
+/// A trace in memory, which clock, ports and loop write.
+#[derive(Debug, Clone)]
+pub struct Log(Rc<RefCell<Recorder<Bytes>>>);
 
-#[derive(Default)]
-struct Records {
-    bytes: Vec<u8>,
-    /// Start, time and port of the newest record.
-    newest: Option<(usize, u64, u8)>,
-}
+/// The bytes of a trace.
+#[derive(Debug, Default)]
+pub struct Bytes(Vec<u8>);
 
-impl Records {
-    /// Bytes of the same moment and port go into one record.
-    fn add(&mut self, at: u64, port: u8, bytes: &[u8]) {
-        let start = match self.newest {
-            Some((start, newest, of)) if (newest, of) == (at, port) => start,
-            _ => {
-                self.bytes.extend(Record::header(at, port, 0));
-                self.bytes.len() - Record::HEADER
-            }
-        };
-        self.newest = Some((start, at, port));
-        self.bytes.extend(bytes);
-        let length = (self.bytes.len() - start - Record::HEADER) as u16;
-        self.bytes[start..start + Record::HEADER]
-            .copy_from_slice(&Record::header(at, port, length));
+impl Sink for Bytes {
+    fn put(&mut self, head: &[u8], body: &[u8]) {
+        self.0.extend_from_slice(head);
+        self.0.extend_from_slice(body);
     }
 }
 
-/// A port whose received bytes are written down.
-struct Tap<P> {
-    inner: P,
-    port: u8,
-    clock: Clock,
-    log: Log,
-}
-
-impl<P: ErrorType> ErrorType for Tap<P> {
-    type Error = P::Error;
-}
-
-impl<P: ReadReady> ReadReady for Tap<P> {
-    fn read_ready(&mut self) -> Result<bool, P::Error> {
-        self.inner.read_ready()
+impl Default for Log {
+    fn default() -> Self {
+        Self(Rc::new(RefCell::new(Recorder::new(Bytes::default()))))
     }
 }
 
-impl<P: Read> Read for Tap<P> {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, P::Error> {
-        let count = self.inner.read(buffer)?;
-        if count > 0 {
-            let at = self.clock.now().as_ticks();
-            self.log.0.borrow_mut().add(at, self.port, &buffer[..count]);
+impl Log {
+    /// What was written so far.
+    pub fn take(&self) -> Vec<u8> {
+        std::mem::take(&mut self.0.borrow_mut().sink_mut().0)
+    }
+}
+
+impl Note for Log {
+    fn with(&self, with: impl FnOnce(&mut dyn Noted)) {
+        with(&mut *self.0.borrow_mut());
+    }
+}
+
+/// Replays a trace on this computer; the trace of the replay.
+///
+/// # Panics
+/// One of more than 32 MB.
+pub fn replayed(trace: &[u8]) -> Vec<u8> {
+    let mut room = vec![0; 32 << 20];
+    let length = replay::run(trace, &mut room, slots(), slots()).expect("room");
+    room.truncate(length);
+    room
+}
+
+/// Where the bridge does something else than in the trace, and when, µs.
+///
+/// # Panics
+/// A trace that cannot be read to its end.
+pub fn first_difference(trace: &[u8]) -> Option<(u64, Difference)> {
+    let strict = Strict::new(trace);
+    let mut replay = Replay::new(&strict, (), slots(), |gripper| gripper);
+    replay.app.keep_profile(slots());
+    while !replay.is_over() {
+        let due = replay.app.step();
+        if replay.rest(due) == Outcome::Reboot {
+            break;
         }
-        Ok(count)
+    }
+    assert_eq!((strict.damage(), strict.has_gap()), (None, false));
+    if strict.difference().is_none() {
+        assert_eq!(
+            strict.offset(),
+            trace.len(),
+            "it was not replayed to its end"
+        );
+    }
+    strict.difference()
+}
+
+/// What a trace holds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Turns of the loop.
+    pub turns: u32,
+    /// Reads of any port.
+    pub reads: u32,
+    /// Writes to any port.
+    pub writes: u32,
+    /// Writes to the gripper that carry a command (FC23).
+    pub commands: u32,
+    /// Frames and changes of state.
+    pub seen: u32,
+}
+
+/// Counts what a trace holds.
+pub fn counts(trace: &[u8]) -> Counts {
+    let mut counts = Counts::default();
+    let mut reader = Reader::new(trace);
+    while let Ok(Some(entry)) = reader.read() {
+        match entry {
+            Entry::Clock { turn: true, .. } => counts.turns += 1,
+            Entry::Read { .. } => counts.reads += 1,
+            Entry::Write { port, bytes } => {
+                counts.writes += 1;
+                let command = port == GRIPPER && bytes.get(1) == Some(&0x17);
+                counts.commands += u32::from(command);
+            }
+            Entry::Seen(_) => counts.seen += 1,
+            _ => {}
+        }
+    }
+    counts
+}
+
+/// The same trace with reads that follow each other in one: the host's line is read byte by byte. For replays that go by time.
+pub fn with_longer_reads(trace: &[u8]) -> Vec<u8> {
+    let log = Log::default();
+    let mut reader = Reader::new(trace);
+    let mut newest: Option<(u8, Vec<u8>)> = None;
+    loop {
+        let entry = reader.read().ok().flatten();
+        if let (Some(Entry::Read { port, bytes }), Some((of, all))) = (entry, &mut newest)
+            && port == *of
+        {
+            all.extend_from_slice(bytes);
+            continue;
+        }
+        if let Some((port, bytes)) = newest.take() {
+            let bytes = &bytes;
+            log.note(&Entry::Read { port, bytes });
+        }
+        match entry {
+            Some(Entry::Read { port, bytes }) => newest = Some((port, bytes.to_vec())),
+            Some(entry) => log.note(&entry),
+            None => return log.take(),
+        }
     }
 }
 
-impl<P: Write> Write for Tap<P> {
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, P::Error> {
-        self.inner.write(bytes)
+/// What virtual devices know of a trace: the bytes that came from them, and when. No instants of the loop.
+pub fn at_the_devices(trace: &[u8]) -> Vec<u8> {
+    let log = Log::default();
+    let mut reader = Reader::new(trace);
+    let mut at = None;
+    while let Ok(Some(entry)) = reader.read() {
+        match entry {
+            Entry::Clock { at: now, .. } => at = Some(now),
+            Entry::Head { .. } | Entry::Read { .. } => {
+                if let Some(at) = at.take() {
+                    log.note(&Entry::Clock { turn: false, at });
+                }
+                log.note(&entry);
+            }
+            _ => {}
+        }
     }
-
-    fn flush(&mut self) -> Result<(), P::Error> {
-        self.inner.flush()
-    }
+    log.take()
 }
 
 /// Bytes from the host; what the bridge says is not looked at.

@@ -2,13 +2,14 @@
 //! Skipped, with a word, where QEMU or the firmware is missing.
 #![allow(missing_docs)]
 
+use bridge::trace::{Difference, Entry, GRIPPER, Reader};
 use hae::image::JointOrder;
 use loop_tests::bits::{self, compare};
 use loop_tests::chip::{self, bench};
 use loop_tests::emulated::alone;
 use loop_tests::images::{self, SHAPE};
-use loop_tests::replay::{self, GLOVE, GRIPPER, HOST, Record, VALUES, records};
-use loop_tests::trace::{short, slots, worn};
+use loop_tests::replay;
+use loop_tests::trace::{at_the_devices, counts, first_difference, replayed, short, worn};
 
 const SEED: u64 = 1;
 
@@ -26,82 +27,107 @@ fn the_map_gives_the_same_bits_here_and_on_the_chip() {
     assert!(inputs.len() >= 10_000 && refused > 50);
 }
 
-fn replayed_here(trace: &[u8]) -> Vec<u8> {
-    let mut room = vec![0; 5 << 20];
-    let length = replay::run(trace, &mut room, slots(), slots()).expect("room");
-    room.truncate(length);
-    room
-}
-
-/// A write to the gripper that carries a command (FC23).
-fn is_motion(record: &Record<'_>) -> bool {
-    record.port == GRIPPER && record.bytes.get(1) == Some(&0x17)
-}
-
-fn sorts(output: &[u8]) -> [usize; 4] {
-    [HOST, GLOVE, GRIPPER, VALUES].map(|port| records(output).filter(|r| r.port == port).count())
+#[test]
+fn a_trace_commands_the_gripper_and_its_replay_is_the_same_trace() {
+    for faulty in [false, true] {
+        let recorded = short(SEED, faulty);
+        let (following, holds) = (recorded.following_frames, recorded.holds);
+        assert!(
+            following > 100 && (faulty || holds <= 1),
+            "{following} {holds}"
+        );
+        let counts = counts(&recorded.trace);
+        println!(
+            "faulty {faulty}: {} bytes, {counts:?}",
+            recorded.trace.len()
+        );
+        assert!(
+            counts.seen > following && counts.commands > 500,
+            "{counts:?}"
+        );
+        assert_eq!(first_difference(&recorded.trace), None, "faulty {faulty}");
+        assert!(replayed(&recorded.trace) == recorded.trace);
+    }
 }
 
 #[test]
-fn a_stored_trace_commands_the_gripper_and_twice_in_the_same_way() {
-    let recorded = short(SEED, false);
-    let (following, holds) = (recorded.following_frames, recorded.holds);
-    assert!(following > 100 && holds <= 1, "{following} {holds}");
-    let output = replayed_here(&recorded.trace);
-    let [host, glove, gripper, values] = sorts(&output);
-    println!("{host} host, {glove} glove, {gripper} gripper writes, {values} frames");
-    assert!(values as u32 > following);
-    let motions = |all: &[u8]| records(all).filter(is_motion).count();
-    assert!(motions(&output) > 500, "{}", motions(&output));
-    assert!(
-        replayed_here(&recorded.trace) == output,
-        "the second replay differs"
-    );
+fn an_honest_glove_with_its_profile_replays_to_its_end_as_it_was_recorded() {
+    let recorded = worn(SEED);
+    let frames = recorded.following_frames;
+    assert!(frames > 100, "{frames}");
+    let counts = counts(&recorded.trace);
+    println!("{frames} frames followed, {counts:?}");
+    assert!(counts.commands > 50, "{counts:?}");
+    assert_eq!(first_difference(&recorded.trace), None);
+    assert!(replayed(&recorded.trace) == recorded.trace);
+    let Some(bench) = bench() else { return };
+    let _alone = alone();
+    let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false).expect("an output");
+    assert!(chip == recorded.trace, "the chip's trace is another one");
 }
 
 #[test]
-fn a_stored_trace_gives_the_same_commands_here_and_on_the_chip() {
+fn a_trace_gives_the_same_trace_on_the_chip() {
     let Some(bench) = bench() else { return };
     let _alone = alone();
     for faulty in [false, true] {
         let recorded = short(SEED, faulty);
-        let here = replayed_here(&recorded.trace);
         let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false).expect("an output");
-        let pairs = records(&here).zip(records(&chip));
-        for (number, (here, chip)) in pairs.enumerate() {
-            assert_eq!(here, chip, "record {number}, faulty {faulty}");
-        }
-        assert!(here == chip, "one output goes on after the other's end");
+        assert!(chip == recorded.trace, "faulty {faulty}");
         println!(
-            "faulty {faulty}: {} bytes in, {:?} writes and frames, {} bytes out: all the same",
-            recorded.trace.len(),
-            sorts(&here),
-            here.len()
+            "faulty {faulty}: {} bytes, {:?}: all the same",
+            chip.len(),
+            counts(&chip)
         );
-        assert!(records(&here).filter(is_motion).count() > 500);
     }
 }
 
 #[test]
-fn an_honest_glove_with_its_profile_gives_the_same_bits_here_and_on_the_chip() {
-    let recorded = worn(SEED);
-    let recorded_frames = recorded.following_frames;
-    assert!(recorded_frames > 100, "{recorded_frames}");
-    let here = replayed_here(&recorded.trace);
-    let motions = records(&here).filter(is_motion).count();
-    println!("{recorded_frames} frames followed, {motions} commands");
-    // Calibrated by its profile it follows; where the replay's moments drift from the recording's, bytes come at others on both.
-    assert!(motions > 50, "{motions}");
+fn bytes_of_the_devices_get_their_instants_on_the_chip_or_here_and_replay_in_the_other_home() {
+    let bytes = at_the_devices(&short(SEED, true).trace);
+    assert!(!replay::has_turns(&bytes));
+    let here = replayed(&bytes);
+    assert!(replay::has_turns(&here) && counts(&here).commands > 100);
+    assert_eq!(first_difference(&here), None, "taken here, replayed here");
     let Some(bench) = bench() else { return };
     let _alone = alone();
-    let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false).expect("an output");
-    for (number, (here, chip)) in records(&here).zip(records(&chip)).enumerate() {
-        assert_eq!(here, chip, "record {number}");
+    let run = |trace: &[u8]| chip::run(&bench, chip::REPLAY, trace, &[], false).expect("an output");
+    let there = run(&bytes);
+    assert!(
+        replayed(&there) == there,
+        "taken on the chip, replayed here"
+    );
+    assert!(run(&here) == here, "taken here, replayed on the chip");
+}
+
+#[test]
+fn a_status_with_another_byte_in_it_is_a_difference_that_is_named() {
+    let mut trace = short(SEED, false).trace;
+    let mut reader = Reader::new(&trace);
+    let mut place = None;
+    while let Ok(Some(entry)) = reader.read() {
+        if let Entry::Read {
+            port: GRIPPER,
+            bytes,
+        } = entry
+            && bytes.len() > 10
+            && reader.at() > 21_000_000
+        {
+            place = Some((reader.offset() - 3, reader.at()));
+            break;
+        }
     }
-    assert!(here == chip, "one output goes on after the other's end");
-    println!(
-        "{} bytes in, {:?} writes and frames: all the same",
-        recorded.trace.len(),
-        sorts(&here)
+    let (offset, at) = place.expect("a status");
+    trace[offset] ^= 1;
+    let (found, difference) = first_difference(&trace).expect("a difference");
+    println!("{} µs after the changed byte: {difference}", found - at);
+    // The frame's checksum is wrong: the driver waits for an answer, or reads on.
+    assert!(found >= at && found - at < 1_000_000);
+    assert!(
+        matches!(
+            difference,
+            Difference::Call { .. } | Difference::Byte { .. } | Difference::Seen { .. }
+        ),
+        "{difference:?}"
     );
 }

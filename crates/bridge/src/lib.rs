@@ -15,6 +15,7 @@
 //! | [`calibration`] | whether the glove is calibrated, and how the newest try ended |
 //! | [`config`] | what a person may set, with ranges |
 //! | [`event`], [`telemetry`] | what happened and what is, for whoever looks |
+//! | [`trace`] | everything that comes and goes, written down and replayed bit for bit |
 //! | [`board`], [`timing`] | the home underneath; every time the bridge waits for |
 //!
 //! It allocates nothing, reads no clock but its platform's, and does not know what a port is. `docs/safety.md` says which
@@ -35,6 +36,7 @@ pub mod store;
 pub mod supervisor;
 pub mod telemetry;
 pub mod timing;
+pub mod trace;
 
 pub use app::App;
 pub use board::{Board, Platform, Slot};

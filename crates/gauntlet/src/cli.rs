@@ -8,8 +8,8 @@ use anyhow::Result;
 use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 
 use crate::commands::{
-    bridge, calibrate, demo, doctor, eval, export, flash, glove, gripper, ports, record, report,
-    reproduce, settings, simulate, teleop, train,
+    bridge, calibrate, demo, doctor, eval, export, flash, glove, gripper, ports, record, replay,
+    report, reproduce, settings, simulate, teleop, train,
 };
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
@@ -62,6 +62,8 @@ pub enum Verb {
     Simulate(simulate::Simulate),
     /// Drive a gripper with a glove, through two serial ports.
     Teleop(teleop::Teleop),
+    /// Replay a session's log: the same commands bit for bit, or what another map would have commanded.
+    Replay(replay::Replay),
     /// Write a trained map into a file as the image that a bridge takes, or a session log into tables.
     Export(export::Export),
     /// Write a trained map into a bridge that runs on a chip.
@@ -112,6 +114,7 @@ impl Verb {
             Self::Reproduce(options) => options.json,
             Self::Simulate(_) => false,
             Self::Teleop(options) => options.json,
+            Self::Replay(options) => options.json,
             Self::Export(options) => options.json,
             Self::Flash(options) => options.json,
             Self::Bridge(options) => options.what.at().json,
@@ -170,6 +173,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Reproduce(options) => reproduce::run(&options, &interrupt()?),
         Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
         Verb::Teleop(options) => teleop::run(&options, &interrupt()?),
+        Verb::Replay(options) => replay::run(&options, &interrupt()?),
         Verb::Export(options) => export::run(&options),
         Verb::Flash(options) => flash::run(&options, &interrupt()?),
         Verb::Bridge(options) => bridge::run(&options, &interrupt()?),

@@ -16,6 +16,7 @@ pub mod cli;
 pub mod commands;
 mod flat_hand;
 mod heard;
+mod line_log;
 pub mod live;
 pub mod options;
 pub mod out;

@@ -1,12 +1,14 @@
 //! Options that several verbs have.
 
 use std::path::Path;
-use std::time::Duration;
+use std::sync::LazyLock;
+use std::time::{Duration, SystemTime};
 
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
 use glove::imu;
+use host::clock::rfc3339;
 use host::failure::Failure;
 use host::lines::glove::{RAISED, Reading};
 use host::lines::{Model, Settings};
@@ -163,6 +165,16 @@ pub fn typed() -> Vec<String> {
     std::iter::once("gauntlet".to_owned())
         .chain(words)
         .collect()
+}
+
+/// The name of a session's log where none is said: of this second.
+pub fn log_name() -> &'static str {
+    static NAME: LazyLock<String> = LazyLock::new(|| {
+        let now = rfc3339(SystemTime::now());
+        // A colon is no character of a file's name on some systems.
+        format!("gauntlet-{}.mcap", now.replace(':', "-"))
+    });
+    &NAME
 }
 
 /// Takes a gripper's name on the command line.

@@ -14,7 +14,8 @@ use bridge::protocol::message::{
     WeightsKind,
 };
 use gauntlet::results::{
-    calibrations, devices, gloves, headings, maps, named, paper, recordings, runs, settings,
+    calibrations, devices, gloves, headings, maps, named, paper, recordings, replays, runs,
+    settings,
 };
 use gripper::{Activation, Fault};
 use host::calibration::guide::{Check, Finding as Found, Joint};
@@ -245,6 +246,49 @@ fn results_of_runs_keep_their_names() {
         "runs.json",
         &[sample("teleop", run()), sample("demo", demo)],
     );
+}
+
+#[test]
+fn results_of_replays_keep_their_names() {
+    let apart = |max| replays::Distance {
+        frames: 254,
+        one_sided: 1,
+        mean: 1.5,
+        max,
+        max_at_s: 12.5,
+        max_axis: 2,
+    };
+    let replayed = replays::Replayed {
+        log: path("session.mcap"),
+        program: "gauntlet 0.1.0",
+        finished: false,
+        damage: vec!["bytes 100 to 200: a chunk whose checksum is wrong".to_owned()],
+        covers_s: 20.0,
+        took_s: 0.25,
+        times_real_time: 80.0,
+        turns: 12_345,
+        states_alike: 800,
+        gripper_bytes_alike: 30_000,
+        glove_bytes_alike: 90_000,
+        difference: Some(replays::Difference {
+            at_s: 12.5,
+            what: "byte 7 of a write to the gripper".to_owned(),
+        }),
+        cut: Some("from 12.000 s to 12.500 s the log is damaged"),
+        other: Some(replays::Other {
+            frames: 255,
+            output: apart(20.0),
+            command: apart(10.0),
+        }),
+        driven: Some(replays::Driven {
+            requests: 1_000,
+            served: 900,
+            positions: vec![1.0, 2.0, 3.0, 137.0],
+            in_the_log: Some(vec![1, 2, 3, 137]),
+        }),
+        failure: None,
+    };
+    golden("replays.json", &[sample("replay", replayed)]);
 }
 
 #[test]

@@ -5,7 +5,8 @@
 //! | [`lines`], [`probe`] | serial ports, Modbus TCP; does the right device answer there? |
 //! | [`session`] | a bridge that is driven and watched, in this process or on a chip |
 //! | [`scanning`] | a glove that is read by itself |
-//! | [`recording`] | the session log |
+//! | [`recording`], [`trace`] | the session log; the bridge's trace on its way there |
+//! | [`replay`] | a log through the same bridge again, or through another one |
 //! | [`calibration`] | a glove calibrated by a person, or from a recorded session; its profile |
 //! | [`settings`] | what a person prefers, from a file |
 //! | [`teaching`] | a person who shows the hand poses that a map is trained with |
@@ -36,6 +37,7 @@ pub mod next;
 pub mod probe;
 pub mod realtime;
 pub mod recording;
+pub mod replay;
 pub mod report;
 pub mod scanning;
 pub mod session;
@@ -43,5 +45,6 @@ pub mod settings;
 pub mod stats;
 pub mod teaching;
 mod toml_file;
+pub mod trace;
 pub mod training;
 pub mod words;

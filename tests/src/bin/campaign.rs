@@ -12,9 +12,8 @@ use loop_tests::emulated::{Loop, alone, cut_power};
 use loop_tests::power_cuts::{
     self, UNIT, every_pair, every_single, four_kilobytes, full_size, small,
 };
-use loop_tests::replay::{GRIPPER, VALUES, records};
 use loop_tests::trace::{self, record};
-use loop_tests::{bits, images, replay, slot_contents};
+use loop_tests::{bits, images, killed, random, sessions, slot_contents};
 
 const SEED: u64 = 0x6175_6E74_6C65_7400;
 /// Gripper cycles a second that a bridge on the chip must reach.
@@ -30,9 +29,14 @@ fn main() -> ExitCode {
         ["powercut", "qemu"] => kills(),
         ["same-bits"] => same_bits(),
         ["measure"] => measure(),
+        ["sessions"] => sessions().and_then(|()| killed_logs()),
+        ["log-writer", path] => {
+            killed::write_for_ever(std::path::Path::new(path));
+            Ok(())
+        }
         ["count"] => counts().map(|text| print!("{text}")),
         _ => Err(
-            "usage: campaign powercut [store | contents | qemu] | same-bits | measure | count"
+            "usage: campaign powercut [store | contents | qemu] | same-bits | sessions | measure | count"
                 .to_owned(),
         ),
     };
@@ -134,21 +138,78 @@ fn same_bits() -> Result<(), String> {
             faulty,
             seed,
         );
-        let here = replayed(&recorded.trace)?;
+        let here = trace::replayed(&recorded.trace);
+        if here != recorded.trace {
+            return Err(format!("trace {seed}: its replay here differs"));
+        }
         let chip = chip::run(&bench, chip::REPLAY, &recorded.trace, &[], false)?;
         if here != chip {
             return Err(format!("trace {seed}: the chip's output differs"));
         }
-        let count = |port| records(&here).filter(|record| record.port == port).count();
         println!(
-            "trace {seed}, faulty {faulty}: {} bytes in; {} writes to the gripper, {} frames' angles, outputs and targets: the same {} bytes",
-            recorded.trace.len(),
-            count(GRIPPER),
-            count(VALUES),
+            "trace {seed}, faulty {faulty}: {:?}: the same {} bytes when it was taken, here and there",
+            trace::counts(&here),
             here.len()
         );
     }
     Ok(())
+}
+
+/// Seeded sessions with faults, replayed from their logs.
+fn sessions() -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let (mut time, mut took, mut bytes) = (0.0, 0.0, 0);
+    let (mut commands, mut states, mut events) = (0, 0, 0);
+    let (outcome, s) = shown("sessions", |p| {
+        for seed in 1..=50 {
+            let path = folder.path().join(format!("{seed}.mcap"));
+            let session = sessions::replayed(seed, 30, &path);
+            let same = &session.same;
+            if same.difference.is_some() || same.cut.is_some() {
+                return Err(format!("seed {seed}: {same:?}"));
+            }
+            time += same.time_us as f64 * 1e-6;
+            took += session.took.as_secs_f64();
+            bytes += session.bytes;
+            commands += same.written[1];
+            states += same.seen;
+            events += session.events;
+            p(seed, 50);
+        }
+        Ok(())
+    });
+    outcome?;
+    println!(
+        "50 seeded sessions, {time:.0} s on the virtual clock, {events} faults and acts: 0 of {commands} bytes to the gripper and 0 of {states} \
+         frames and states differ; replayed {:.0} times as fast as they were, {:.2} MB of trace a minute ({s:.0} s)",
+        time / took,
+        bytes as f64 / time * 60e-6
+    );
+    if time / took < 20.0 {
+        return Err("a replay must be 20 times as fast as the session".to_owned());
+    }
+    Ok(())
+}
+
+/// Logs whose writer is killed.
+fn killed_logs() -> Result<(), String> {
+    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
+    let (lost, s) = shown("kills", |p| {
+        let kill = |number: u64| {
+            let time = Duration::from_millis(300 + random(SEED + number) % 3_000);
+            let path = folder.path().join(format!("{number}.mcap"));
+            let lost = killed::kill_after(time, &path);
+            p(number, 100);
+            // Killed before its first half second it has nothing yet.
+            lost.unwrap_or(time.as_secs_f64())
+        };
+        (1..=100).map(kill).fold(0.0, f64::max)
+    });
+    println!("100 writers killed: at most {lost:.3} s before the kill are missing ({s:.0} s)");
+    match lost <= 1.0 {
+        true => Ok(()),
+        false => Err("a killed run loses 1 s at most".to_owned()),
+    }
 }
 
 /// The recorded hand where it is there, else one that moves all joints.
@@ -162,19 +223,12 @@ fn recorded_or_moving() -> impl Fn(f64) -> bits::Pose + Send {
     }
 }
 
-fn replayed(trace: &[u8]) -> Result<Vec<u8>, String> {
-    let mut room = vec![0; 6 << 20];
-    let length = replay::run(trace, &mut room, trace::slots(), trace::slots())
-        .ok_or("no room for the output")?;
-    room.truncate(length);
-    Ok(room)
-}
-
 fn counts() -> Result<String, String> {
     let bench = bench().ok_or("no chip to count on")?;
     let recorded = loop_tests::trace::short(1, false);
     let image = images::gentle(1);
-    let text = chip::run(&bench, chip::COUNT, &image, &recorded.trace, true)?;
+    let trace = trace::with_longer_reads(&recorded.trace);
+    let text = chip::run(&bench, chip::COUNT, &image, &trace, true)?;
     String::from_utf8(text).map_err(|error| error.to_string())
 }
 

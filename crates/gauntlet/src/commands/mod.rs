@@ -11,6 +11,7 @@ pub mod glove;
 pub mod gripper;
 pub mod ports;
 pub mod record;
+pub mod replay;
 pub mod report;
 pub mod reproduce;
 pub mod settings;

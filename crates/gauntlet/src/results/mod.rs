@@ -11,6 +11,7 @@ pub mod headings;
 pub mod maps;
 pub mod paper;
 pub mod recordings;
+pub mod replays;
 pub mod runs;
 pub mod settings;
 

@@ -36,10 +36,25 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
     let summary = mcap::Summary::read(&bytes)
         .unwrap()
         .expect("the log has its index");
-    assert_eq!(summary.channels.len(), 6);
+    assert_eq!(summary.channels.len(), 7);
     let counts = summary.stats.unwrap().channel_message_counts;
-    assert_eq!(counts.len(), 6, "every channel has messages: {counts:?}");
+    assert_eq!(counts.len(), 7, "every channel has messages: {counts:?}");
     assert_eq!(simulation.end(), Some(0));
+    let log = log.to_str().unwrap();
+    let replayed = json(&support::run(&["replay", log, "--rate", "50", "--json"]));
+    assert!(replayed["difference"].is_null(), "{replayed}");
+    assert!(replayed["cut"].is_null(), "{replayed}");
+    assert_eq!(replayed["finished"], true, "{replayed}");
+    assert!(replayed["gripper_bytes_alike"].as_u64() > Some(1_000));
+    assert!(replayed["states_alike"].as_u64() > Some(50), "{replayed}");
+    let other = &replayed["other"];
+    assert!(
+        other["output"]["max"].as_f64() < Some(0.5),
+        "the same map: {other}"
+    );
+    assert!(other["command"]["max"].as_f64() > Some(0.0), "{other}");
+    let driven = json(&support::run(&["replay", log, "--to", "virtual", "--json"]));
+    assert!(driven["driven"]["served"].as_u64() > Some(10), "{driven}");
 }
 
 #[test]

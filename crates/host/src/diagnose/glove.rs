@@ -13,7 +13,7 @@ use std::time::Duration;
 
 use glove::hand::SEGMENT_COUNT;
 use glove::mux;
-use glove::scan::Health;
+use glove::scan::{Config, Health};
 
 use super::Findings;
 use super::answer::Came;
@@ -26,6 +26,7 @@ use crate::lines::i2c::Address;
 use crate::lines::list;
 use crate::lines::port::{BAUD, Port};
 use crate::next::{Command, advice};
+use crate::trace::TraceLog;
 use bridge_chip::{
     BAUDS, BUS_HUNG, DONE, FAST_BAUD, MULTIPLEXERS, NO_ACKNOWLEDGE, READ_STATUS, RESET_BAUD,
     SET_TIMEOUT, WAIT,
@@ -50,7 +51,12 @@ pub fn glove(path: &Path, reading: Reading, interrupt: &Interrupt) -> Findings {
             findings.wrong("bridge", what, UNKEPT_NEXT);
         } else if let Some(address) = multiplexer(&mut port, &mut findings, interrupt) {
             let watch = port.watch();
-            let scanner = GloveLine::from(port).scanner_at(reading, address);
+            let line = GloveLine::from(port);
+            let config = Config {
+                mux: address,
+                ..reading.config(&line)
+            };
+            let scanner = line.scanner(config, TraceLog::default());
             let glove = sensors::Examined {
                 place: path,
                 mux: address,

@@ -1,14 +1,16 @@
 //! The ways to a glove's sensors: a serial port with an SC18IM, or an I²C port of this computer.
 
+use bridge::trace::{GLOVE, Tapped};
 use glove::bus::{Batch, Bus, Error, Reply};
 use glove::sc18im::{self, SPEEDS, Sc18im};
 use glove::scan::{BusScanner, Config, Scanner};
 use glove::timing::FUSION_PERIOD;
-use glove::{Instant, imu, mux};
+use glove::{Instant, imu};
 
 use super::i2c;
 use super::port::{BAUD, Port, Watch};
 use crate::next::{Command, NextStep, Warning};
+use crate::trace::TraceLog;
 
 /// The speeds to which a glove's serial line may be raised, baud, from the lowest.
 pub const RAISED: [u32; 3] = [SPEEDS[2], SPEEDS[1], SPEEDS[0]];
@@ -37,7 +39,7 @@ impl Default for Reading {
 
 impl Reading {
     /// The scanner's settings on `line`.
-    fn config(self, line: &GloveLine) -> Config {
+    pub fn config(self, line: &GloveLine) -> Config {
         let usual = Config::default();
         let (baud, period) = match line {
             GloveLine::Serial(port) => (port.baud(), usual.period),
@@ -82,6 +84,14 @@ pub enum GloveLine {
 }
 
 impl GloveLine {
+    /// Its name in a trace.
+    pub fn way(&self) -> &'static str {
+        match self {
+            Self::Serial(_) => "serial",
+            Self::I2c(_) => "i2c",
+        }
+    }
+
     /// A handle to wait on it and to see how it fares.
     pub fn watch(&self) -> Watch {
         match self {
@@ -90,19 +100,12 @@ impl GloveLine {
         }
     }
 
-    /// The scanner on it. The speed of a serial port is found, raised and kept by it.
-    pub fn scanner(self, reading: Reading) -> BusScanner<GloveBus> {
-        self.scanner_at(reading, mux::ADDRESS)
-    }
-
-    /// The same with the multiplexer at the address `mux`.
-    pub fn scanner_at(self, reading: Reading, mux: u8) -> BusScanner<GloveBus> {
-        let config = Config {
-            mux,
-            ..reading.config(&self)
-        };
+    /// The scanner on it, with what [`Reading::config`] says for it. The speed of a serial port is found, raised and kept by it. What
+    /// a serial port carries goes to `trace`.
+    pub fn scanner(self, config: Config, trace: TraceLog) -> BusScanner<GloveBus> {
         let bus = match self {
             Self::Serial(port) => {
+                let port = Tapped::new(port, GLOVE, trace);
                 let scanner = Scanner::new(port, config).with_set_baud();
                 GloveBus::Serial(Box::new(scanner.into_bus()))
             }
@@ -122,7 +125,7 @@ impl From<Port> for GloveLine {
 #[derive(Debug)]
 pub enum GloveBus {
     /// Behind a serial bridge.
-    Serial(Box<Sc18im<Port>>),
+    Serial(Box<Sc18im<Tapped<Port, TraceLog>>>),
     /// On an I²C port.
     I2c(i2c::Port),
 }

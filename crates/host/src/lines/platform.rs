@@ -6,9 +6,12 @@ use std::sync::Arc;
 use gripper::Instant;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
+use bridge::trace::Note as _;
+
 use super::port::Watch;
 use crate::clock::Clock;
 use crate::interrupt::Interrupt;
+use crate::trace::TraceLog;
 
 /// One port to wait on, and whether its driver left bytes lying at the last look.
 #[derive(Debug)]
@@ -23,6 +26,7 @@ pub struct Pc {
     clock: Clock,
     ports: Vec<Waited>,
     interrupt: Interrupt,
+    trace: TraceLog,
 }
 
 impl Pc {
@@ -39,7 +43,14 @@ impl Pc {
             clock,
             ports,
             interrupt,
+            trace: TraceLog::default(),
         }
+    }
+
+    /// The same, with the instants at which the clock is read written down.
+    #[must_use]
+    pub fn traced(self, trace: TraceLog) -> Self {
+        Self { trace, ..self }
     }
 
     /// Descriptors worth waiting on. A port whose bytes were there last time and were not read since is left out:
@@ -56,10 +67,13 @@ impl Pc {
 
 impl bridge::Platform for Pc {
     fn now(&mut self) -> Instant {
-        self.clock.now()
+        let now = self.clock.now();
+        self.trace.clock(now);
+        now
     }
 
     fn wait_until(&mut self, due: Instant) {
+        self.trace.waited();
         let now = self.clock.now();
         let Some(left) = due
             .checked_duration_since(now)

@@ -33,6 +33,14 @@ pub struct Drawn {
     pub gripper: Model,
 }
 
+impl Drawn {
+    /// A right hand and a 3-Finger gripper.
+    pub const USUAL: Self = Self {
+        side: Side::Right,
+        gripper: Model::ThreeFinger,
+    };
+}
+
 /// A frame and what moves with it.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Part {

@@ -13,7 +13,7 @@ use trainer::hand::Space;
 use super::channels::{COMMAND, HAND, JOINT_ANGLES, LEFT};
 use super::fields::{LETTERS, read_number};
 use super::openxr;
-use super::reader::{self, Damage, Message};
+use super::salvage::{self, Damage, Message};
 use crate::failure::{Failure, OrFail};
 use crate::next::{Command as Typed, NextStep, advice};
 
@@ -76,7 +76,7 @@ pub fn read(path: &Path) -> Result<Exported> {
     let what = || format!("the session log {}", path.display());
     let file = std::fs::read(path).or_fail(what, "a log that is there and that you may read")?;
     let mut exported = Exported::default();
-    let found = reader::read(&file, |message| exported.take(&message)).or_fail(what, record())?;
+    let found = salvage::read(&file, |message| exported.take(&message)).or_fail(what, record())?;
     exported.damage = found.damage;
     exported.finished = found.finished;
     if exported.poses.is_empty() && exported.commands.is_empty() {

@@ -4,10 +4,11 @@ use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError};
+use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
+use gripper::Instant as Moment;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use mcap::{MAGIC, McapResult, WriteOptions, Writer};
@@ -15,13 +16,18 @@ use mcap::{MAGIC, McapResult, WriteOptions, Writer};
 use super::channels::{CHANNELS, Channel, Decoder};
 use super::drawing::Drawn;
 use crate::clock::Clock;
-use crate::session::record::Record;
+use crate::session::record::{Record, Records};
 use crate::words::disk;
 
 /// Bytes to a chunk at most; most are closed by time.
 const CHUNK: u64 = 1 << 20;
 /// Records to a chunk at most: those of the bring-up come all at once.
 const RECORDS: usize = 128;
+/// The topic of the trace's blocks, and their coding: the clock's reading before the block and its newest one in the block,
+/// µs, u64 little-endian; then entries as [`bridge::trace`] codes them.
+pub const TRACE_TOPIC: &str = "/bridge/trace";
+/// The name of that coding.
+pub const TRACE_ENCODING: &str = "gauntlet.trace";
 /// Pause between two closed chunks: a program that is killed loses no more.
 const CLOSE_EVERY: Duration = Duration::from_millis(500);
 /// Pause between two looks whether the log is to end.
@@ -79,6 +85,8 @@ pub(super) struct LogFile {
     ids: [u16; CHANNELS.len()],
     sequence: [u32; CHANNELS.len()],
     decoder: Decoder,
+    /// The trace's channel, and its next number.
+    trace: (u16, u32),
     /// Log time of the newest message: it never goes back, and is never 0.
     newest: u64,
     clock: Clock,
@@ -120,7 +128,7 @@ impl LogFile {
             .chunk_size(Some(CHUNK))
             // A chunk is put together in memory: what is in the file is whole.
             .disable_seeking(true)
-            .library(concat!("gauntlet ", env!("CARGO_PKG_VERSION")))
+            .library(crate::trace::PROGRAM)
             .create(NoSeek::new(sink))?;
         let mut ids = [0; CHANNELS.len()];
         for (channel, id) in CHANNELS.iter().zip(&mut ids) {
@@ -133,6 +141,9 @@ impl LogFile {
             let metadata = channel.metadata(drawn);
             *id = writer.add_channel(schema, channel.topic, encoding, &metadata)?;
         }
+        let version = bridge::trace::VERSION.to_string();
+        let metadata = [("version".to_owned(), version)].into();
+        let trace = writer.add_channel(0, TRACE_TOPIC, TRACE_ENCODING, &metadata)?;
         writer.flush()?;
         let mut log = Self {
             writer,
@@ -140,6 +151,7 @@ impl LogFile {
             ids,
             sequence: [0; CHANNELS.len()],
             decoder: Decoder::new(drawn),
+            trace: (trace, 0),
             newest: 1,
             clock,
             written: Whole::default(),
@@ -152,16 +164,15 @@ impl LogFile {
 
     /// Writes what comes, until nothing can come any more, or `closing` is set and what waited is written, or the file takes
     /// nothing.
-    pub(super) fn write_all(&mut self, records: &Receiver<Record>, closing: &AtomicBool) {
-        let result = self.write_until_end(records, closing);
+    pub(super) fn write_all(&mut self, records: &Records, closing: &AtomicBool) {
+        let result = self
+            .write_until_end(records, closing)
+            .and_then(|()| self.write_trace(records));
+        records.trace.close();
         self.note(&result);
     }
 
-    fn write_until_end(
-        &mut self,
-        records: &Receiver<Record>,
-        closing: &AtomicBool,
-    ) -> McapResult<()> {
+    fn write_until_end(&mut self, records: &Records, closing: &AtomicBool) -> McapResult<()> {
         let mut close = Instant::now() + CLOSE_EVERY;
         let mut sync = Instant::now() + SYNC_EVERY;
         let mut waiting = 0;
@@ -171,7 +182,7 @@ impl LogFile {
                 true => Duration::ZERO,
                 false => LOOK.min(close.saturating_duration_since(Instant::now())),
             };
-            match records.recv_timeout(wait) {
+            match records.records.recv_timeout(wait) {
                 Ok(record) => {
                     self.write(&record)?;
                     waiting += 1;
@@ -182,6 +193,7 @@ impl LogFile {
             }
             let now = Instant::now();
             if now >= close || waiting >= RECORDS {
+                self.write_trace(records)?;
                 self.close_chunk()?;
                 waiting = 0;
                 close = now + CLOSE_EVERY;
@@ -212,9 +224,7 @@ impl LogFile {
         };
         self.sequence[index] = self.sequence[index].wrapping_add(1);
         self.writer.write_to_known_channel(&header, text)?;
-        self.written.messages += 1;
-        let (first, last) = self.written.span.unwrap_or((at, at));
-        self.written.span = Some((first.min(at), last.max(at)));
+        self.count(at);
         Ok(())
     }
 
@@ -222,6 +232,37 @@ impl LogFile {
     fn log_time(&mut self, at: u64) -> u64 {
         self.newest = self.newest.max(at);
         self.newest
+    }
+
+    /// Writes what waits of the trace, a message a block.
+    fn write_trace(&mut self, records: &Records) -> McapResult<()> {
+        let blocks = records.trace.take();
+        for (number, block) in blocks.iter().enumerate() {
+            if number > 0 {
+                // Those of the bring-up come all at once.
+                self.close_chunk()?;
+            }
+            let at = self.clock.wall_ns(Moment::from_ticks(block.at));
+            let header = MessageHeader {
+                channel_id: self.trace.0,
+                sequence: self.trace.1,
+                log_time: self.log_time(at),
+                publish_time: at,
+            };
+            self.trace.1 = self.trace.1.wrapping_add(1);
+            let mut message = [block.since, block.at].map(u64::to_le_bytes).concat();
+            message.extend_from_slice(&block.bytes);
+            self.writer.write_to_known_channel(&header, &message)?;
+            self.count(at);
+        }
+        Ok(())
+    }
+
+    /// One more message, of `at`.
+    fn count(&mut self, at: u64) {
+        self.written.messages += 1;
+        let (first, last) = self.written.span.unwrap_or((at, at));
+        self.written.span = Some((first.min(at), last.max(at)));
     }
 
     fn close_chunk(&mut self) -> McapResult<()> {

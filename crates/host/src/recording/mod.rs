@@ -20,8 +20,9 @@ pub mod openxr;
 pub mod poses;
 mod protobuf;
 mod rates;
-pub mod reader;
 mod robot_description;
+pub mod salvage;
+pub mod traced;
 
 pub use drawing::Drawn;
 
@@ -121,7 +122,7 @@ impl SessionLog {
         let writer = std::thread::Builder::new()
             .name("session log".to_owned())
             .spawn(move || {
-                file.write_all(&records.records, &closed);
+                file.write_all(&records, &closed);
                 file.finish()
             })
             .or_fail(what, "ending other programs")?;

@@ -25,6 +25,7 @@ use crate::interrupt::Interrupt;
 use crate::lines::glove::{GloveLine, Reading};
 use crate::lines::port::Watch;
 use crate::realtime;
+use crate::trace::TraceLog;
 
 pub use bringup::{BringUp, open};
 pub use hand::{Flat, Hand, Pose};
@@ -38,12 +39,14 @@ pub const QUEUE: usize = 256;
 const LOOK: Duration = Duration::from_millis(20);
 
 /// How a glove is read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone)]
 pub struct Settings {
     /// What a person chose of it.
     pub reading: Reading,
     /// Frames that may wait to be taken, 1 at least.
     pub queue: usize,
+    /// Where the port's bytes go, with the instants at which they were read and written.
+    pub trace: TraceLog,
 }
 
 impl Default for Settings {
@@ -51,6 +54,7 @@ impl Default for Settings {
         Self {
             reading: Reading::default(),
             queue: QUEUE,
+            trace: TraceLog::default(),
         }
     }
 }
@@ -81,6 +85,7 @@ impl Scanning {
         let worker = worker::Worker::new(
             line,
             settings.reading,
+            settings.trace,
             clock,
             interrupt,
             hand,

@@ -15,6 +15,7 @@ use crate::clock::{Clock, since};
 use crate::interrupt::Interrupt;
 use crate::lines::Pc;
 use crate::lines::glove::{GloveBus, GloveLine, Reading};
+use crate::trace::TraceLog;
 
 /// The longest wait: an end is heard within it.
 const LONGEST: Duration = Duration::from_millis(20);
@@ -33,14 +34,18 @@ impl Worker {
     pub fn new(
         line: GloveLine,
         reading: Reading,
+        trace: TraceLog,
         clock: Clock,
         interrupt: &Interrupt,
         hand: SyncSender<Scanned>,
         shared: Arc<Shared>,
     ) -> Self {
+        let config = reading.config(&line);
+        trace.begin_scan(line.way(), &config);
+        let pc = Pc::new(clock, [line.watch()], interrupt.clone());
         Self {
-            pc: Pc::new(clock, [line.watch()], interrupt.clone()),
-            scanner: line.scanner(reading),
+            pc: pc.traced(trace.clone()),
+            scanner: line.scanner(config, trace),
             hand,
             shared,
             said: None,

@@ -6,7 +6,7 @@
 use std::thread::JoinHandle;
 
 use anyhow::Result;
-use bridge::{App, Board, SafeAction, WeightsStore};
+use bridge::{App, Board, SafeAction};
 use glove::calibration::Bound;
 use glove::hand::Side;
 use glove::imu::Mode;
@@ -18,15 +18,16 @@ use super::orders::{Order, Orders};
 use super::record::Feed;
 use super::slots::MemorySlot;
 use super::stopped::Stopped;
-use super::worker::{PcApp, Worker};
+use super::stored::stored;
+use super::worker::{PcApp, Traced, Worker, traced};
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 use crate::lines::glove::{GloveBus, GloveLine, Reading};
 use crate::lines::port::Watch;
 use crate::lines::{Line, Model, Pc, Settings};
-use crate::next::{Command, advice};
 use crate::realtime::{self, Scheduling};
+use crate::trace::Home;
 
 /// What a session is made of.
 #[derive(Debug)]
@@ -67,11 +68,18 @@ pub struct Driving {
 }
 
 impl Driving {
-    fn settings<const X: usize>(&self, side: Side, mode: Mode) -> bridge::Settings<X> {
-        let usual = bridge::Settings::<X>::default();
-        bridge::Settings {
+    /// The bridge's settings for a glove on this hand whose sensors run this fusion.
+    pub fn settings<const X: usize>(&self, side: Side, mode: Mode) -> bridge::Settings<X> {
+        self.over(bridge::Settings {
             side,
             heading_is_relative: mode == Mode::Imu,
+            ..bridge::Settings::<X>::default()
+        })
+    }
+
+    /// Those settings with what is said here.
+    pub fn over<const X: usize>(&self, usual: bridge::Settings<X>) -> bridge::Settings<X> {
+        bridge::Settings {
             speed: self.speed.map_or(usual.speed, |speed| [speed; X]),
             force: self.force.map_or(usual.force, |force| [force; X]),
             rate: self.rate.unwrap_or(usual.rate),
@@ -110,7 +118,9 @@ impl InProcess {
         parts: Parts,
         clock: Clock,
         interrupt: &Interrupt,
-        driver: impl FnOnce(Line, gripper::driver::Config) -> <Pc as Board<X>>::Gripper + Send + 'static,
+        driver: impl FnOnce(Traced, gripper::driver::Config) -> <Pc as Board<X>>::Gripper
+        + Send
+        + 'static,
     ) -> Result<Self>
     where
         Pc: Board<X, Glove = GloveBus, Flash = MemorySlot>,
@@ -126,17 +136,32 @@ impl InProcess {
             ("gripper", parts.gripper.watch()),
         ];
         let watches = ports.clone().map(|(_, watch)| watch);
-        let platform = Pc::new(clock, watches, interrupt.clone());
+        let trace = parts.feed.as_ref().map(Feed::trace).unwrap_or_default();
+        let platform = Pc::new(clock, watches, interrupt.clone()).traced(trace.clone());
         let mut worker = Worker::new(queue, hub.clone(), parts.feed);
         let line = parts.gripper.driver_config(parts.line);
+        let network = matches!(parts.gripper, Line::Tcp(_));
+        let scan = parts.reading.config(&parts.glove);
+        let home = Home::new(
+            parts.model.option(),
+            network,
+            &line,
+            &scan,
+            parts.glove.way(),
+        );
+        trace.begin(
+            &home,
+            config.settings(),
+            &parts.image,
+            parts.profile.as_ref(),
+        );
         let (glove, gripper, profile) = (parts.glove, parts.gripper, parts.profile);
-        let reading = parts.reading;
         let bridge = std::thread::Builder::new().name("bridge".to_owned());
         let (tell_scheduling, scheduling) = std::sync::mpsc::sync_channel(1);
         let start = move || {
             bridge.spawn(move || {
-                let scanner = glove.scanner(reading);
-                let gripper = driver(gripper, line);
+                let scanner = glove.scanner(scan, trace.clone());
+                let gripper = driver(traced(gripper, trace), line);
                 let mut app: PcApp<X> = App::new(platform, scanner, gripper, store, config);
                 if let Some(profile) = &profile {
                     // The clutch is open.
@@ -210,59 +235,6 @@ impl Drop for InProcess {
             let _ = self.stop();
         }
     }
-}
-
-/// Whether a weights image gives as many positions as the gripper has axes.
-///
-/// # Errors
-/// A failure that says how many it gives, and what to do.
-pub fn check_image(image: &[u8], model: Model) -> Result<()> {
-    // The header's number of outputs (docs/weights-image.md); whatever else is wrong with it, the store says.
-    let outputs = image.get(32..36).and_then(|bytes| bytes.try_into().ok());
-    match outputs.map(|bytes| u32::from_le_bytes(bytes) as usize) {
-        Some(outputs) if image.starts_with(&hae::image::MAGIC) && outputs != model.axes() => {
-            Err(other_shape(outputs, model).into())
-        }
-        _ => Ok(()),
-    }
-}
-
-fn other_shape(outputs: usize, model: Model) -> Failure {
-    let other = match outputs {
-        1 => {
-            "the same with --gripper-model 2f85, 2f140 or hande, if it is one of these; else a map for it: "
-        }
-        4 => "the same with --gripper-model 3f, if it is the 3-Finger; else a map for it: ",
-        _ => "a map for this gripper: ",
-    };
-    let next = advice(other).then(Command::gauntlet("help train"));
-    Failure::new(
-        format!(
-            "the map gives {outputs} position{}, and the {} has {} ax{}s",
-            if outputs == 1 { "" } else { "s" },
-            model.name(),
-            model.axes(),
-            if model.axes() == 1 { "i" } else { "e" },
-        ),
-        next,
-    )
-}
-
-/// A store that holds the image, put there the way it comes over a line: begun, in chunks, committed last.
-fn stored(image: &[u8], model: Model) -> Result<WeightsStore<MemorySlot>> {
-    check_image(image, model)?;
-    let expected = bridge::app::expected(model.axes());
-    let mut store = WeightsStore::new([MemorySlot::new(), MemorySlot::new()], expected);
-    let refused = || "the weights image was refused".to_owned();
-    let next = "training the model again";
-    store.begin(image.len()).or_fail(refused, next)?;
-    for (index, chunk) in image.chunks(bridge::store::PAGE).enumerate() {
-        store
-            .chunk(index * bridge::store::PAGE, chunk)
-            .or_fail(refused, next)?;
-    }
-    store.commit().or_fail(refused, next)?;
-    Ok(store)
 }
 
 #[cfg(test)]

@@ -32,12 +32,14 @@ mod on_chip;
 mod on_chip_tests;
 mod orders;
 pub mod record;
+mod replayed;
 pub mod replies;
 #[cfg(test)]
 mod scripted;
 pub mod slots;
 pub mod snapshot;
 pub mod stopped;
+pub(crate) mod stored;
 mod summary;
 mod totals;
 mod worker;
@@ -48,12 +50,14 @@ pub use devices::Devices;
 pub use driven::Driven;
 pub use ending::{CLOSED_TOO_LATE, Driver, Ending};
 pub use hub::{Happened, Hub};
-pub use in_process::{Driving, InProcess, Parts, check_image};
+pub use in_process::{Driving, InProcess, Parts};
 pub use numbers::Progress;
 pub use on_chip::OnChip;
 pub use orders::{Order, Orders};
+pub use replayed::{Outcome, Replayed};
 pub use snapshot::Snapshot;
 pub use stopped::Stopped;
+pub use stored::check_image;
 pub use summary::Summary;
 
 /// A running bridge.

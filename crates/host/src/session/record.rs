@@ -9,6 +9,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 
+use crate::trace::TraceLog;
+
 use super::axes::Axes;
 use super::snapshot::{Headings, Motion, Status};
 
@@ -113,8 +115,15 @@ pub fn queue(capacity: usize) -> (Feed, Records) {
     let feed = Feed {
         sender,
         lost: Arc::clone(&lost),
+        trace: TraceLog::new(),
     };
-    (feed, Records { records, lost })
+    let trace = feed.trace.clone();
+    let records = Records {
+        records,
+        lost,
+        trace,
+    };
+    (feed, records)
 }
 
 /// The session's end.
@@ -122,9 +131,15 @@ pub fn queue(capacity: usize) -> (Feed, Records) {
 pub struct Feed {
     sender: SyncSender<Record>,
     lost: Arc<AtomicU64>,
+    trace: TraceLog,
 }
 
 impl Feed {
+    /// Where the session writes its trace.
+    pub fn trace(&self) -> TraceLog {
+        self.trace.clone()
+    }
+
     /// Hands one over. Never waits: with the queue full it is counted as lost.
     pub fn hand(&self, record: Record) {
         // A keeper that ended said why.
@@ -140,6 +155,8 @@ pub struct Records {
     /// The records, in order.
     pub records: Receiver<Record>,
     lost: Arc<AtomicU64>,
+    /// What came over the ports, and everything else that a replay needs.
+    pub trace: TraceLog,
 }
 
 impl Records {

@@ -2,6 +2,7 @@
 
 use bridge::event::Kind;
 use bridge::telemetry::Sent;
+use bridge::trace::{self, Entry, GRIPPER, Look, Note as _, Tapped};
 use bridge::{App, Board, Epoch, HoldReason, State, Telemetry};
 use glove::bus::Bus as _;
 use gripper::driver::{ThreeFinger, TwoFinger};
@@ -17,16 +18,25 @@ use super::stopped::{HOLD_WAIT, Standing, Stopped};
 use crate::lines::glove::GloveBus;
 use crate::lines::{Line, Pc};
 use crate::realtime::Scheduling;
+use crate::trace::TraceLog;
+
+/// A gripper's line whose bytes are written down.
+pub(super) type Traced = Tapped<Line, TraceLog>;
+
+/// `line` with its bytes written to `trace`.
+pub(super) fn traced(line: Line, trace: TraceLog) -> Traced {
+    Tapped::new(line, GRIPPER, trace)
+}
 
 impl Board<4> for Pc {
     type Glove = GloveBus;
-    type Gripper = ThreeFinger<Line>;
+    type Gripper = ThreeFinger<Traced>;
     type Flash = MemorySlot;
 }
 
 impl Board<1> for Pc {
     type Glove = GloveBus;
-    type Gripper = TwoFinger<Line>;
+    type Gripper = TwoFinger<Traced>;
     type Flash = MemorySlot;
 }
 
@@ -38,6 +48,8 @@ pub(super) struct Worker {
     orders: Queue,
     hub: Hub,
     feed: Option<Feed>,
+    trace: TraceLog,
+    look: Look,
     pub scheduling: Scheduling,
     /// Of the newest closing of the clutch.
     epoch: Option<Epoch>,
@@ -64,6 +76,8 @@ impl Worker {
         Self {
             orders,
             hub,
+            trace: feed.as_ref().map(Feed::trace).unwrap_or_default(),
+            look: Look::default(),
             feed,
             scheduling: Scheduling::Shared,
             epoch: None,
@@ -96,29 +110,39 @@ impl Worker {
         Pc: Board<X>,
     {
         if let Some(profile) = self.orders.profile() {
-            // An event tells where it is refused.
-            let _ = app.set_profile(profile.as_ref());
+            let bytes = profile.map(|profile| profile.to_bytes());
+            let bytes = bytes.as_ref().map_or(&[][..], |bytes| &bytes[..]);
+            self.give(app, trace::Order::Profile(bytes));
         }
         while let Some(order) = self.orders.next() {
-            match order {
-                Order::Engage => self.epoch = Some(app.engage()),
-                Order::Heartbeat => {
-                    if let Some(epoch) = self.epoch {
-                        // Refused where the clutch is open; telemetry tells so.
-                        let _ = app.heartbeat(epoch);
-                    }
-                }
-                Order::Release => app.release(),
+            let order = match order {
+                Order::Engage => trace::Order::Engage,
+                Order::Heartbeat => match self.epoch {
+                    Some(epoch) => trace::Order::Heartbeat(epoch),
+                    None => continue,
+                },
+                Order::Release => trace::Order::Release,
                 Order::Activate => {
                     self.activation_asked = true;
-                    app.activate();
+                    trace::Order::Activate
                 }
-                Order::FlatPose(wait) => app.calibrate_flat_hand_within(wait),
-                Order::CalibrateStraight(wait) => app.calibrate_straight_within(wait),
-                Order::FindFlat(on) => app.set_finds_flat(on),
-                Order::UndoCalibration => app.undo_calibration(),
+                Order::FlatPose(wait) => trace::Order::FlatPose(wait.as_ticks()),
+                Order::CalibrateStraight(wait) => trace::Order::CalibrateStraight(wait.as_ticks()),
+                Order::FindFlat(on) => trace::Order::FindFlat(on),
+                Order::UndoCalibration => trace::Order::UndoCalibration,
                 Order::Stop => return self.end(app),
-            }
+            };
+            self.give(app, order);
+        }
+    }
+
+    /// Writes an order down and tells the bridge.
+    fn give<const X: usize>(&mut self, app: &mut PcApp<X>, order: trace::Order<'_>)
+    where
+        Pc: Board<X>,
+    {
+        if let Some(epoch) = self.trace.give(&order, app) {
+            self.epoch = Some(epoch);
         }
     }
 
@@ -127,7 +151,7 @@ impl Worker {
         Pc: Board<X>,
     {
         if self.ending.is_none() {
-            app.release();
+            self.give(app, trace::Order::Release);
             self.ending = Some(app.telemetry().now);
         }
     }
@@ -161,11 +185,12 @@ impl Worker {
             .then_some(Stopped::NotConfirmed)
     }
 
-    fn hand_over<const X: usize>(&mut self, app: &mut PcApp<X>)
-    where
-        Pc: Board<X>,
-    {
+    /// Tells the hub and the feed what is new after a step.
+    pub fn hand_over<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>) {
         let telemetry = *app.telemetry();
+        if let Some(seen) = self.look.look(&telemetry) {
+            self.trace.note(&Entry::Seen(seen));
+        }
         let hub = self.hub.clone();
         let mut said = hub.lock();
         if telemetry.frame_sequence != self.seen.frame

@@ -3,7 +3,7 @@
 
 use super::flash;
 use super::memory::Memory;
-use super::replay::{AXES, Machine, Replay, Tape, scanner};
+use super::replay::{AXES, Replay, scanner};
 use bridge::gripper::driver::ThreeFinger;
 use bridge::gripper::link::Counters;
 use bridge::gripper::registers::Fault;
@@ -13,7 +13,8 @@ use bridge::hae::image::Verifier;
 use bridge::posture::Posture;
 use bridge::protocol::Outcome;
 use bridge::supervisor::{Hand, Inputs, Supervisor, Weights};
-use bridge::{Clutch, Config, Instant, Platform, State, glove};
+use bridge::trace::{GLOVE, GRIPPER, HOST, Loose, Source};
+use bridge::{Clutch, Config, Instant, State, glove};
 use core::cell::Cell;
 use core::fmt::Write;
 use core::hint::black_box;
@@ -78,9 +79,10 @@ pub fn all(memory: Memory) -> Option<usize> {
         output,
         ..
     } = memory;
-    // The replay's own output comes first and is not needed.
-    let (scratch, room) = output.split_at_mut_checked(5 << 20)?;
-    let mut text = Text { room, length: 0 };
+    let mut text = Text {
+        room: output,
+        length: 0,
+    };
     let empty = count(|| ()).0;
     let mut tell = |name: &str, most: Most| {
         let instructions = most.instructions - empty;
@@ -89,26 +91,20 @@ pub fn all(memory: Memory) -> Option<usize> {
     tell("map", map(image)?)?;
     tell("image_check_step", check(image)?)?;
     tell("supervisor_step", supervisor())?;
-    let [request, reply, idle, frame, late] = looped(trace, scratch)?;
+    let [request, reply, idle, frame, late] = looped(trace)?;
     tell("rtu_request", request)?;
     tell("rtu_reply", reply)?;
     tell("app_step_without_frame", idle)?;
     tell("app_step_with_frame", frame)?;
     tell("host_and_rest_of_turn", late)?;
-    let [sample, angles] = scanned(trace, scratch)?;
+    let [sample, angles] = scanned(trace)?;
     tell("imu_sample", sample)?;
     tell("hand_angles", angles)?;
-    let [mean, most, pose] = worn(trace, scratch)?;
+    let [mean, most, pose] = worn(trace)?;
     tell("headings_and_angles_mean", mean)?;
     tell("headings_and_angles", most)?;
     tell("flat_pose", pose)?;
-    let length = text.length;
-    // To where the host looks for it.
-    let (scratch, room) = output.split_at_mut_checked(5 << 20)?;
-    scratch
-        .get_mut(..length)?
-        .copy_from_slice(room.get(..length)?);
-    Some(length)
+    Some(text.length)
 }
 
 fn map(image: &[u8]) -> Option<Most> {
@@ -217,19 +213,28 @@ impl<const X: usize, R: Gripper<X>> Gripper<X> for Counted<'_, R> {
     }
 }
 
+/// Finds what came in this turn: the trace's work, and not that of what is counted.
+fn find(trace: &impl Source) {
+    for port in [HOST, GLOVE, GRIPPER] {
+        let _ = black_box(trace.ready(port));
+    }
+}
+
 /// The whole loop over the trace: request, reply, step without and with a frame, the rest of a turn.
-fn looped(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 5]> {
+fn looped(trace: &[u8]) -> Option<[Most; 5]> {
     let (request, reply) = (Cell::default(), Cell::default());
-    let tape = Tape::new(trace, scratch);
-    let mut replay = Replay::new(&tape, flash::slots(), |inner: ThreeFinger<_>| Counted {
+    let tape = Loose::new(trace);
+    let mut replay = Replay::new(&tape, (), flash::slots(), |inner: ThreeFinger<_>| Counted {
         inner,
         request: &request,
         reply: &reply,
     });
     let [mut without, mut with, mut rest] = [Most::default(); 3];
+    replay.app.keep_profile(flash::profile_slots());
     let mut followed = false;
     while !replay.is_over() {
         let frames = replay.app.telemetry().frame_sequence;
+        find(&tape);
         let (instructions, due) = count(|| replay.app.step());
         let seen = replay.app.telemetry();
         followed |= seen.state == State::Following;
@@ -238,8 +243,9 @@ fn looped(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 5]> {
         } else {
             with.see(instructions);
         }
-        let (instructions, outcome) = count(|| replay.rest(due));
+        let (instructions, outcome) = count(|| replay.serve());
         rest.see(instructions);
+        replay.end_turn(due);
         if outcome == Outcome::Reboot {
             break;
         }
@@ -248,9 +254,8 @@ fn looped(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 5]> {
 }
 
 /// The scanner alone: a poll that takes a sensor's sample, and the joint angles of a frame.
-fn scanned(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 2]> {
-    let tape = Tape::new(trace, scratch);
-    let mut machine = Machine::new(&tape);
+fn scanned(trace: &[u8]) -> Option<[Most; 2]> {
+    let tape = Loose::new(trace);
     let mut scanner = scanner(&tape);
     let mut posture = Posture::new(
         glove::hand::Side::Right,
@@ -258,7 +263,8 @@ fn scanned(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 2]> {
     );
     let [mut sample, mut angles] = [Most::default(); 2];
     while !tape.is_over() {
-        let now = machine.now();
+        let now = tape.now();
+        find(&tape);
         let good = scanner.counters().good;
         let (instructions, frame) = count(|| scanner.poll(now));
         if scanner.counters().good != good && frame.is_none() {
@@ -270,7 +276,7 @@ fn scanned(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 2]> {
                 angles.see(instructions);
             }
         }
-        machine.wait_until(scanner.next_due().unwrap_or(now));
+        tape.wait_until(scanner.next_due().unwrap_or(now));
     }
     (angles.times > 0).then_some([sample, angles])
 }
@@ -280,15 +286,15 @@ const POSE_FRAMES: u32 = 40;
 
 /// The same frames with a profile: alignment, headings, angles and what is beyond a hand, in the mean and at most; and what takes a
 /// flat pose.
-fn worn(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 3]> {
-    let tape = Tape::new(trace, scratch);
-    let mut machine = Machine::new(&tape);
+fn worn(trace: &[u8]) -> Option<[Most; 3]> {
+    let tape = Loose::new(trace);
     let mut scanner = scanner(&tape);
     let mut posture = Posture::new(glove::hand::Side::Right, None);
     let [mut mean, mut most, mut pose] = [Most::default(); 3];
     let (mut frames, mut sum) = (0, 0u64);
     while !tape.is_over() {
-        let now = machine.now();
+        let now = tape.now();
+        find(&tape);
         if let Some(frame) = scanner.poll(now) {
             if frames == 0 {
                 posture.set_profile(Some(&profile(scanner.ids())));
@@ -308,7 +314,7 @@ fn worn(trace: &[u8], scratch: &mut [u8]) -> Option<[Most; 3]> {
                 pose.see(instructions);
             }
         }
-        machine.wait_until(scanner.next_due().unwrap_or(now));
+        tape.wait_until(scanner.next_due().unwrap_or(now));
     }
     mean.times = most.times;
     mean.instructions = sum.checked_div(u64::from(most.times))? as u32;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::{Args, Subcommand};
 
-use crate::options::run_time;
+use crate::options::{log_name, run_time};
 use crate::web::ViewOptions;
 use host::chip::link::{Address, Error, HostLink};
 use host::next::Command;
@@ -96,6 +96,9 @@ pub enum BridgeVerb {
         /// The page.
         #[command(flatten)]
         view: ViewOptions,
+        /// Write what the bridge tells and is told into a log, of this name or one with the date.
+        #[arg(long, value_name = "FILE.mcap", num_args = 0..=1, default_missing_value = log_name())]
+        log: Option<PathBuf>,
     },
     /// Write the hand's joint angles, 20 a second, into a poses file that `train` takes.
     Log {

@@ -55,9 +55,12 @@ pub(crate) fn run(options: &Bridge, interrupt: &Interrupt) -> Result<()> {
             calibrate::calibrate(at, profile.as_deref(), flat, interrupt)
         }
         BridgeVerb::Release { at } => release(at),
-        BridgeVerb::Monitor { at, seconds, view } => {
-            watch::monitor(at, (*seconds, view), interrupt)
-        }
+        BridgeVerb::Monitor {
+            at,
+            seconds,
+            view,
+            log,
+        } => watch::monitor(at, log.as_deref(), (*seconds, view), interrupt),
         BridgeVerb::Log { at, out, seconds } => watch::log(at, out, *seconds, interrupt),
         BridgeVerb::Select { slot, at } => select(at, *slot),
         BridgeVerb::Reboot { at } => reboot(at),

@@ -2,6 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::options::log_name;
 use clap::Args;
 use glove::hand::Side;
 
@@ -52,6 +53,9 @@ pub struct Calibrate {
     /// The profile for --flat, instead of the one that the glove's ids find.
     #[arg(long, value_name = "FILE.toml", requires = "flat")]
     pub profile: Option<PathBuf>,
+    /// Write everything that the glove says into a log, of this name or one with the date.
+    #[arg(long, value_name = "FILE.mcap", num_args = 0..=1, default_missing_value = log_name(), conflicts_with_all = ["list", "flat", "bridge"])]
+    pub log: Option<PathBuf>,
     /// List the profiles that are there; no glove is needed.
     #[arg(long)]
     pub list: bool,

@@ -9,6 +9,7 @@ use glove::headings::NotFlat;
 use super::args::Calibrate;
 use super::source::{Place, Source};
 use crate::commands::bridge::flat_pose;
+use crate::line_log::LineLog;
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
 use crate::wearer::Listener;
@@ -30,7 +31,7 @@ const TRIES: usize = 3;
 /// No profile is of this glove; the hand did not lie flat; a sensor has slipped.
 pub(super) fn run(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
-    let (mut source, _) = place.open(&tell, interrupt)?;
+    let (mut source, _) = place.open(&tell, &mut LineLog::default(), interrupt)?;
     let known = known(options, place, &mut source)?;
     match &known.calibrated {
         Some(when) => tell.say(format_args!("profile    {}  of {when}", known.place)),

@@ -17,6 +17,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::UniqueId;
 
 use crate::commands::bridge::flat_pose;
+use crate::line_log::LineLog;
 use crate::outputs::{self, Kind};
 use crate::results::{self, calibrations};
 use crate::tell::Tell;
@@ -96,7 +97,8 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
         outputs::check(out, Kind::Profile, &[])?;
     }
     let page = Page::start(&options.view, &tell)?;
-    let (source, missing) = place.open(&tell, interrupt)?;
+    let mut log = LineLog::new(options.log.as_deref())?;
+    let (source, missing) = place.open(&tell, &mut log, interrupt)?;
     if missing > 0 {
         let what = format!(
             "the glove on {} lacks sensors, and a calibration needs all 16",
@@ -116,6 +118,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
     session.shows(page);
     let led = session.lead(&tell, interrupt);
     let mut done = session.finish();
+    let logged = log.finish(&tell);
     let link = done.link.take();
     let mut kept = None;
     let decided = led.and_then(|led| match led {
@@ -165,7 +168,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
         tell.say(format_args!("profile    {}", path.display()));
         tell.say(format_args!("next       {next}"));
     }
-    let (judgement, failure) = results::judged(decided);
+    let (judgement, failure) = results::judged(decided.and(logged));
     if options.json {
         results::print(
             "calibrate",

@@ -8,6 +8,7 @@ use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use glove::imu::UniqueId;
 
 use crate::commands::glove::GloveAt;
+use crate::line_log::LineLog;
 use crate::results::gloves;
 use crate::tell::Tell;
 use host::calibration::virtual_person::VirtualPerson;
@@ -67,11 +68,17 @@ impl Place<'_> {
     ///
     /// # Errors
     /// A failure that names the layer that fails, and what to try.
-    pub fn open(&self, tell: &Tell, interrupt: &Interrupt) -> Result<(Source, usize)> {
+    pub fn open(
+        &self,
+        tell: &Tell,
+        log: &mut LineLog,
+        interrupt: &Interrupt,
+    ) -> Result<(Source, usize)> {
         let address = match self {
             Self::Port(at) => {
                 let clock = Clock::start();
-                let (scanning, missing) = at.read(tell, clock, interrupt)?;
+                let (scanning, missing) = at.read(tell, clock, log.trace(), interrupt)?;
+                log.begin(clock)?;
                 return Ok((Source::Port { scanning, clock }, missing));
             }
             Self::Chip(address) => *address,

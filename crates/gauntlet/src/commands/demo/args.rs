@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 
-use crate::options::{ReadingOptions, model_parser, run_time};
+use crate::options::{ReadingOptions, log_name, model_parser, run_time};
 use crate::web::ViewOptions;
 use host::lines::Model;
 
@@ -30,8 +30,8 @@ pub struct Demo {
     /// Train on and play this recording of a hand instead of generated motion.
     #[arg(long, value_name = "FILE.csv")]
     pub poses: Option<PathBuf>,
-    /// Write every frame, command and status into this session log.
-    #[arg(long, value_name = "FILE.mcap")]
+    /// Write everything that happens into a session log, of this name or one with the date.
+    #[arg(long, value_name = "FILE.mcap", num_args = 0..=1, default_missing_value = log_name())]
     pub log: Option<PathBuf>,
     /// How long to drive the gripper, in seconds (1 to 86400).
     #[arg(long, value_name = "N", default_value = "20", value_parser = run_time, allow_negative_numbers = true)]

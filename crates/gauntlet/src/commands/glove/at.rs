@@ -17,6 +17,7 @@ use host::interrupt::Interrupt;
 use host::lines::list;
 use host::next::Command;
 use host::scanning::{self, BringUp, Hand, Scanning, Settings};
+use host::trace::TraceLog;
 use host::words;
 
 /// Where the glove is, and what is known of it.
@@ -60,9 +61,10 @@ impl GloveAt {
         &self,
         tell: &Tell,
         clock: Clock,
+        trace: TraceLog,
         interrupt: &Interrupt,
     ) -> Result<Opened> {
-        let (scanning, missing) = self.read(tell, clock, interrupt)?;
+        let (scanning, missing) = self.read(tell, clock, trace, interrupt)?;
         let hand = self.known(&scanning, tell)?;
         Ok(Opened {
             scanning,
@@ -79,14 +81,17 @@ impl GloveAt {
         &self,
         tell: &Tell,
         clock: Clock,
+        trace: TraceLog,
         interrupt: &Interrupt,
     ) -> Result<(Scanning, usize)> {
         let place = self.glove.display();
         if let Some(warning) = list::latency_warning(&self.glove) {
             tell.say(format_args!("warning: {place}: {warning}"));
         }
+        let reading = self.reading.given();
         let settings = Settings {
-            reading: self.reading.given(),
+            reading,
+            trace,
             ..Settings::default()
         };
         let BringUp {
@@ -102,7 +107,7 @@ impl GloveAt {
             "glove    {place}  answers, {good} of 16 sensors give orientations, {}",
             words::line_speed(baud)
         ));
-        speed::runs(tell, &self.glove, settings.reading, baud);
+        speed::runs(tell, &self.glove, reading, baud);
         for finding in &missing.0 {
             tell.say(format_args!("warning: {}", finding.what));
             if let Some(next) = &finding.next {

@@ -23,6 +23,7 @@ use host::failure::OrFail;
 use host::interrupt::Interrupt;
 use host::scanning::{self, Flat, Hand, Pose, Scanning, Snapshot};
 use host::stats::{short, short_or_dash};
+use host::trace::TraceLog;
 use host::words;
 
 /// Options of `glove watch`.
@@ -55,7 +56,7 @@ pub(super) fn run(options: &Watch, interrupt: &Interrupt) -> Result<()> {
     let at = &options.at;
     let tell = Tell::new(at.json);
     let clock = Clock::start();
-    let opened = at.open(&tell, clock, interrupt)?;
+    let opened = at.open(&tell, clock, TraceLog::default(), interrupt)?;
     let mut watching = Watching {
         unknown: opened.hand.as_ref().err().cloned(),
         hand: opened.hand.unwrap_or_else(|_| Hand::ideal(at.side())),

@@ -10,7 +10,8 @@ use clap::Args;
 
 use super::glove::{GloveAt, Opened, take_flat};
 use super::teleop::Hand as WhichHand;
-use crate::options::run_time;
+use crate::line_log::LineLog;
+use crate::options::{log_name, run_time};
 use crate::outputs;
 use crate::results::{self, gloves, runs};
 use crate::tell::Tell;
@@ -49,6 +50,9 @@ pub struct Record {
     /// Record for so many seconds without prompts (1 to 86400).
     #[arg(long, value_name = "N", value_parser = run_time, allow_negative_numbers = true)]
     pub seconds: Option<Duration>,
+    /// Write everything that the glove says into a log, of this name or one with the date.
+    #[arg(long, value_name = "FILE.mcap", num_args = 0..=1, default_missing_value = log_name())]
+    pub log: Option<PathBuf>,
 }
 
 /// Records until everything was shown, the time is over or somebody ends it.
@@ -59,12 +63,13 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.at.json);
     outputs::check_new(&options.out, "a recording")?;
     let page = Page::start(&options.view, &tell)?;
+    let mut log = LineLog::new(options.log.as_deref())?;
     let clock = Clock::start();
     let Opened {
         mut scanning,
         hand,
         missing,
-    } = options.at.open(&tell, clock, interrupt)?;
+    } = options.at.open(&tell, clock, log.trace(), interrupt)?;
     complete(options, missing)?;
     let mut hand = hand.map_err(|why| not_calibrated(options, &why))?;
     if !take_flat(&mut hand, &mut scanning, clock, &tell, interrupt)? {
@@ -72,6 +77,7 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     }
     // A full disk is the writer's to tell.
     interrupt.look_after_file_limit();
+    log.begin(clock)?;
     let (file, rows) = PosesFile::create(&options.out, interrupt, Some)?;
     let mut session = Session::new(scanning, hand, rows, options.at.json);
     session.shows(page, options.at.side());
@@ -81,6 +87,7 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     };
     let done = session.finish();
     let (rows, written) = file.finish();
+    let written = written.and(log.finish(&tell));
     let ended = recorded.map_err(|gone| match gone {
         session::Gone::Silent => options.at.silent().into(),
         session::Gone::NotCalibrated => lost_calibration(options).into(),

@@ -5,7 +5,9 @@ use std::time::Duration;
 
 use clap::{Args, ValueEnum};
 
-use crate::options::{DrivingOptions, LineOptions, OnOff, ReadingOptions, model_parser, run_time};
+use crate::options::{
+    DrivingOptions, LineOptions, OnOff, ReadingOptions, log_name, model_parser, run_time,
+};
 use crate::web::ViewOptions;
 use host::lines::Model;
 
@@ -75,8 +77,8 @@ pub struct Teleop {
     /// Which gripper it is; the map gives as many positions as it has axes.
     #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
     pub gripper_model: Model,
-    /// Write every frame, command and status into this session log.
-    #[arg(long, value_name = "FILE.mcap")]
+    /// Write everything that happens into a session log, of this name or one with the date.
+    #[arg(long, value_name = "FILE.mcap", num_args = 0..=1, default_missing_value = log_name())]
     pub log: Option<PathBuf>,
     /// The page.
     #[command(flatten)]

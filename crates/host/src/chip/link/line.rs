@@ -15,8 +15,12 @@ use rustix::event::{PollFd, PollFlags, Timespec, poll};
 use rustix::fs::{OFlags, fcntl_getfl, fcntl_setfl};
 use rustix::io::Errno;
 
-use super::Error;
+use bridge::trace::{Entry, HOST, Note as _};
+
+use super::{Error, HostLink};
+use crate::clock::Clock;
 use crate::lines::port::{BAUD, Port};
+use crate::trace::TraceLog;
 
 /// A socket must be connected by then.
 const CONNECT_WAIT: Duration = Duration::from_secs(3);
@@ -68,12 +72,38 @@ impl fmt::Display for Address {
     }
 }
 
+/// Where what goes over a line is written down, and by which clock.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Kept {
+    trace: TraceLog,
+    clock: Option<Clock>,
+}
+
+impl Kept {
+    fn note(&self, entry: &Entry<'_>) {
+        if let Some(clock) = &self.clock {
+            self.trace.clock(clock.now());
+            self.trace.note(entry);
+        }
+    }
+}
+
+impl HostLink {
+    /// Writes down from now on what goes over the line: what the bridge tells and what it is told.
+    pub fn keep(&mut self, trace: TraceLog, clock: Clock) {
+        let clock = Some(clock);
+        self.kept = Kept { trace, clock };
+        self.line = self.line.take().map(|line| line.kept(&self.kept));
+    }
+}
+
 /// An open line. Reads and writes end by their deadlines.
 #[derive(Debug)]
 pub(super) struct Line {
     descriptor: Arc<OwnedFd>,
     /// Keeps a serial port's lock.
     _port: Option<Port>,
+    kept: Kept,
 }
 
 /// The far side is gone, or the system's error.
@@ -92,6 +122,7 @@ impl Line {
                 Ok(Self {
                     descriptor,
                     _port: Some(port),
+                    kept: Kept::default(),
                 })
             }
             Address::Unix(path) => {
@@ -112,7 +143,14 @@ impl Line {
         Ok(Self {
             descriptor: Arc::new(descriptor),
             _port: None,
+            kept: Kept::default(),
         })
+    }
+
+    /// The same, written down.
+    pub(super) fn kept(self, kept: &Kept) -> Self {
+        let kept = kept.clone();
+        Self { kept, ..self }
     }
 
     /// Bytes that are there, waiting for the first until `deadline`; 0 when none came.
@@ -120,7 +158,11 @@ impl Line {
         loop {
             match rustix::io::read(&*self.descriptor, &mut *buffer) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
-                Ok(count) => return Ok(count),
+                Ok(count) => {
+                    let (port, bytes) = (HOST, buffer.get(..count).unwrap_or_default());
+                    self.kept.note(&Entry::Read { port, bytes });
+                    return Ok(count);
+                }
                 Err(Errno::AGAIN | Errno::INTR) => {}
                 Err(error) => return Err(error.into()),
             }
@@ -132,6 +174,7 @@ impl Line {
 
     /// Writes all of `bytes` by `deadline`; a line that does not take them by then is broken.
     pub(super) fn write(&mut self, mut bytes: &[u8], deadline: Instant) -> Result<(), Broken> {
+        self.kept.note(&Entry::Write { port: HOST, bytes });
         while !bytes.is_empty() {
             match rustix::io::write(&*self.descriptor, bytes) {
                 Ok(count) if count > 0 => bytes = bytes.get(count..).unwrap_or_default(),

@@ -26,7 +26,7 @@ pub use clutch::Heartbeat;
 pub use error::{Error, Heard, refusal_next, refusal_words};
 pub use flash::Flashed;
 pub use line::Address;
-use line::Line;
+use line::{Kept, Line};
 
 /// Times a request is sent before the bridge counts as silent.
 pub const ATTEMPTS: u32 = 5;
@@ -51,6 +51,7 @@ const SCANS: usize = 256;
 pub struct HostLink {
     address: Address,
     line: Option<Line>,
+    kept: Kept,
     decoder: Decoder,
     session: u32,
     sequence: u16,
@@ -73,6 +74,7 @@ impl HostLink {
         let mut link = Self {
             address: address.clone(),
             line: None,
+            kept: Kept::default(),
             decoder: Decoder::new(),
             session: new_session(),
             sequence: 0,
@@ -95,7 +97,7 @@ impl HostLink {
         // The old line goes first: a serial port is open once only.
         self.line = None;
         self.decoder = Decoder::new();
-        self.line = Some(Line::open(&self.address)?);
+        self.line = Some(Line::open(&self.address)?.kept(&self.kept));
         let patience = Instant::now() + BUSY_WAIT;
         loop {
             match self.say_hello() {

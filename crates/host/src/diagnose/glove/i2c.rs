@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use glove::bus::{Batch, Error, Transaction};
 use glove::mux;
+use glove::scan::Config;
 
 use super::bridge_chip::MULTIPLEXERS;
 use super::exchange::exchange;
@@ -14,6 +15,7 @@ use crate::interrupt::Interrupt;
 use crate::lines::glove::{GloveLine, Reading};
 use crate::lines::i2c::{self, Address, Port};
 use crate::next::{Command, NextStep, advice};
+use crate::trace::TraceLog;
 
 const HUNG_NEXT: &str = "a short on SDA or SCL, or a chip that holds them: switch the glove off and on; then unplug the multiplexer and \
                          look again";
@@ -43,7 +45,12 @@ pub fn glove(address: &Address, reading: Reading, interrupt: &Interrupt) -> Find
                 );
             }
             let watch = port.watch();
-            let scanner = GloveLine::I2c(port).scanner_at(reading, answers);
+            let line = GloveLine::I2c(port);
+            let config = Config {
+                mux: answers,
+                ..reading.config(&line)
+            };
+            let scanner = line.scanner(config, TraceLog::default());
             let place = PathBuf::from(address.to_string());
             let glove = sensors::Examined {
                 place: &place,
@@ -191,7 +198,9 @@ mod tests {
         let port = Port::over("i2c:/dev/i2c-9".into(), glove.i2c(&clock, 400_000));
         let port = port.expect("a thread");
         let (watch, mut findings) = (port.watch(), Findings::default());
-        let scanner = GloveLine::I2c(port).scanner(Reading::default());
+        let line = GloveLine::I2c(port);
+        let config = Reading::default().config(&line);
+        let scanner = line.scanner(config, TraceLog::default());
         let place = PathBuf::from("i2c:/dev/i2c-9");
         let glove = sensors::Examined {
             place: &place,

@@ -9,6 +9,7 @@ use glove::hand::{JOINT_COUNT, Side};
 use crate::commands::calibrate::source::{Place, Source};
 use crate::commands::teleop::Hand as WhichHand;
 use crate::commands::train::args::Train;
+use crate::line_log::LineLog;
 use crate::live::teach::{Doing, TeachView};
 use crate::live::{Key, Live};
 use crate::out;
@@ -51,7 +52,7 @@ impl<'a> Worn<'a> {
         tell: &Tell,
         interrupt: &Interrupt,
     ) -> Result<Self> {
-        let (mut source, missing) = place.open(tell, interrupt)?;
+        let (mut source, missing) = place.open(tell, &mut LineLog::default(), interrupt)?;
         if missing > 0 {
             let what = format!(
                 "the glove on {} lacks sensors, and a pose needs every joint",

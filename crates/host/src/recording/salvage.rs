@@ -232,3 +232,7 @@ fn messages_of(file: &[u8], body: Range<usize>) -> Result<Range<usize>, String> 
     let start = body.end.saturating_sub(data.len());
     Ok(start..body.end)
 }
+
+#[cfg(test)]
+#[path = "salvage_tests.rs"]
+mod tests;

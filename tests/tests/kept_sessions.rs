@@ -1,0 +1,55 @@
+//! Sessions that were kept: what a log holds gives the same commands again, and a damaged log what is left of it.
+#![allow(missing_docs)]
+
+use host::recording::traced::Traced;
+use host::replay;
+use loop_tests::sessions::replayed;
+
+#[test]
+fn seeded_sessions_with_faults_replay_from_their_logs_with_no_other_byte_or_state() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (mut followed, mut stopped) = (0, 0);
+    for seed in 1..=3 {
+        let session = replayed(seed, 15, &folder.path().join(format!("{seed}.mcap")));
+        println!("seed {seed}: {session:?}");
+        assert_eq!(session.same.difference, None, "seed {seed}");
+        assert_eq!(session.same.cut, None, "seed {seed}");
+        assert!(session.same.time_us > 26_000_000 && session.same.written[1] > 10_000);
+        assert!(session.events > 5, "seed {seed}");
+        followed += session.followed;
+        stopped += session.stopped;
+    }
+    assert!(followed > 100 && stopped > 0, "{followed} {stopped}");
+}
+
+#[test]
+fn a_log_cut_anywhere_or_with_a_flipped_bit_is_replayed_as_far_as_it_goes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let whole = folder.path().join("whole.mcap");
+    let path = folder.path().join("damaged.mcap");
+    let session = replayed(9, 2, &whole);
+    assert_eq!((session.same.difference, session.same.cut), (None, None));
+    let bytes = std::fs::read(&whole).expect("a log");
+    let mut read = 0;
+    for cut in (0..bytes.len()).step_by(bytes.len() / 40 + 1) {
+        std::fs::write(&path, &bytes[..cut]).expect("room");
+        let Ok(traced) = Traced::read(&path) else {
+            continue;
+        };
+        read += 1;
+        assert!(!traced.found.finished && !traced.found.damage.is_empty() || cut > bytes.len() / 2);
+        let same = replay::same(&traced, &mut ()).expect("a bridge");
+        assert_eq!(same.difference, None, "cut at {cut}");
+    }
+    for place in (100..bytes.len()).step_by(bytes.len() / 40 + 1) {
+        let mut flipped = bytes.clone();
+        flipped[place] ^= 1 << (place % 8);
+        std::fs::write(&path, &flipped).expect("room");
+        let Ok(traced) = Traced::read(&path) else {
+            continue;
+        };
+        let same = replay::same(&traced, &mut ()).expect("a bridge");
+        assert_eq!(same.difference, None, "bit at {place}");
+    }
+    println!("{} bytes, {read} cuts could be replayed", bytes.len());
+}
