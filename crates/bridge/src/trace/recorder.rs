@@ -50,7 +50,11 @@ impl<S: Sink> Recorder<S> {
     pub fn note(&mut self, entry: &Entry<'_>) {
         let read = match *entry {
             Entry::Read { port, .. } => Some(port),
-            Entry::Failed { port, call, .. } if call == Call::Read => Some(port),
+            Entry::Failed {
+                port,
+                call: Call::Read,
+                ..
+            } => Some(port),
             _ => None,
         };
         if let Some(port) = self.ready.take()

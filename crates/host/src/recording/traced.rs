@@ -57,7 +57,8 @@ impl Blocks {
         let (since, at) = (u64::from_le_bytes(*since), u64::from_le_bytes(*at));
         self.blocks += 1;
         // The first block begins with the trace.
-        let follows = since == self.end && (self.blocks > 1) == !self.bytes.is_empty();
+        let is_first = self.blocks == 1;
+        let follows = since == self.end && is_first == self.bytes.is_empty();
         match self.gap {
             Some(_) => {}
             None if follows => {
