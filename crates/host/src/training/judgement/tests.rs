@@ -17,7 +17,7 @@ fn frames() -> Matrix {
 
 /// A map written down: thumb to finger A, index to B, ring and little to C, spread to the scissor; each axis is
 /// a + Σ w·relu(v·q + b).
-fn written(units: &[(usize, f32, &[(usize, f32)], f32)], base: [f32; 4]) -> Model {
+fn written(units: &[Unit], base: [f32; 4]) -> Model {
     let mut f = Network::zeros(25, 300, 4);
     for (unit, (axis, weight, inputs, bias)) in units.iter().enumerate() {
         for (joint, factor) in *inputs {
