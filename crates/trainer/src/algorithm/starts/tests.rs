@@ -68,10 +68,10 @@ fn threads_and_pauses_change_no_bit_of_what_several_starts_bring() {
 
 #[test]
 fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
-    let mut seven = starts(7, 2, Answers::ForEach);
-    train(&mut seven, 50);
-    let total = seven.total();
-    let fates = seven.starts();
+    let mut all = starts(13, 2, Answers::ForEach);
+    train(&mut all, 50);
+    let total = all.total();
+    let fates = all.starts();
     let taken: Vec<&Start> = fates.iter().filter(|start| start.is_live).collect();
     let [taken] = taken[..] else {
         panic!("{fates:?}")
@@ -85,12 +85,12 @@ fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
     );
     assert!(fates.iter().any(|start| start.epochs < total));
     // Those that ended at the first cut had cost more than those that went on.
-    let first = seven.cuts[0];
+    let first = all.cuts[0];
     let dear = fates
         .iter()
         .filter(|start| start.epochs == first.epoch)
         .count();
-    assert_eq!(dear, 7 - first.keep);
+    assert_eq!(dear, 13 - first.keep);
 }
 
 #[test]
