@@ -56,5 +56,6 @@ pub fn kill_after(time: Duration, path: &Path) -> Option<f64> {
     let found = salvage::read(&file, |message| newest = newest.max(message.log_time)).ok()?;
     assert!(!found.finished);
     let killed = killed.duration_since(UNIX_EPOCH).expect("after 1970");
-    (newest > 1).then(|| killed.as_secs_f64() - newest as f64 * 1e-9)
+    let lost = killed.as_secs_f64() - newest as f64 * 1e-9;
+    (newest > 1).then_some(lost)
 }

@@ -203,7 +203,7 @@ fn once_more(options: &Record) -> NextStep {
         WhichHand::Right => {}
     }
     if let Some(time) = options.seconds {
-        command = command.option("--seconds", &time.as_secs_f64());
+        command = command.option("--seconds", time.as_secs_f64());
     }
     if let Some(profile) = &options.at.profile {
         command = command.path("--profile", profile);
