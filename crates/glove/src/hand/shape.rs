@@ -2,7 +2,7 @@
 //!
 //! A drawing: the lengths are estimates of an adult's hand of some 190 mm from wrist to middle fingertip, not measured on whoever
 //! wears the glove, and the palm does not bend. Orientations follow the angles exactly, as
-//! [`segment_orientations`](super::segment_orientations) has them; only the thumb is turned to where it rests, because its
+//! [`segment_orientations`] has them; only the thumb is turned to where it rests, because its
 //! angles count from there.
 //!
 //! Frames as in the hand model: x radial on a right hand (ulnar on a left one), y dorsal, z distal. The hand's frame
