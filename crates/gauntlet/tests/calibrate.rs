@@ -159,7 +159,7 @@ fn a_left_glove_that_is_said_to_be_right_is_not_kept_and_on_a_terminal_the_sessi
             std::thread::sleep(Duration::from_millis(50));
         }
     };
-    until(&terminal, "press the space bar");
+    until(&terminal, "and press space");
     terminal.keys(b" ");
     // What is drawn over what stood there is not whole: all of it anew.
     let mut view = terminal.redrawn();

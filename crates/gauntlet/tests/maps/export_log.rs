@@ -112,6 +112,7 @@ fn a_log_becomes_three_tables_beside_it_and_is_read_in_the_place_of_one() {
     let measured = |poses: &Path| {
         json(&run(&[
             "eval",
+            "--model",
             path(model()),
             "--poses",
             path(poses),

@@ -144,7 +144,7 @@ fn a_table_holds_the_orders_and_dashes_and_replaces_an_old_one_whole() {
         "{written}"
     );
     let result = &said["results"][0]["numbers"][0];
-    assert_eq!(result["rows"].as_array().unwrap().len(), 7);
+    assert_eq!(result["rows"].as_array().unwrap().len(), 8);
     assert_eq!(result["orders"].as_array().unwrap().len(), 2);
 }
 

@@ -36,9 +36,9 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
     let summary = mcap::Summary::read(&bytes)
         .unwrap()
         .expect("the log has its index");
-    assert_eq!(summary.channels.len(), 7);
+    assert_eq!(summary.channels.len(), 14);
     let counts = summary.stats.unwrap().channel_message_counts;
-    assert_eq!(counts.len(), 7, "every channel has messages: {counts:?}");
+    assert_eq!(counts.len(), 14, "every channel has messages: {counts:?}");
     assert_eq!(simulation.end(), Some(0));
     let log = log.to_str().unwrap();
     let replayed = json(&support::run(&["replay", log, "--rate", "50", "--json"]));

@@ -71,19 +71,19 @@ fn killed_at_moments(count: u64, seed: u64) {
         let at = 2.0 + 40.0 * random.unit_f64();
         let _ = std::fs::remove_file(&bench.kept.pairs);
         let begun = seconds(body.now());
-        let mut taken = Vec::new();
         let mut now = begun;
-        let killed = lived.poses(&mut body, &mut whole, &bench.kept, &mut |teaching| {
-            taken = teaching.pairs().to_vec();
+        let killed = lived.poses(&mut body, &mut whole, &bench.kept, &mut |_| {
             now += 0.028;
             now - begun > at
         });
-        drop(killed.unwrap());
+        let taken = killed.unwrap().pairs;
         let left = match bench.kept.pairs.exists() {
             true => load_pairs(&bench.kept.pairs, &Aim::Gripper(lived.space)).unwrap(),
             false => Vec::new(),
         };
-        assert_eq!(left, taken, "moment {moment}, {at:.1} s");
+        // A pose that was just taken may not be in the file yet.
+        let is_kept = taken.starts_with(&left) && taken.len() - left.len() <= 1;
+        assert!(is_kept, "moment {moment}, {at:.1} s: {left:?} of {taken:?}");
         // Another program: nothing but the files is left.
         let (mut lessons, _) = lived.lessons(&bench.kept).unwrap();
         let came = lived
