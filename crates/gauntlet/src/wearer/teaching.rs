@@ -180,6 +180,8 @@ pub struct Lived {
     pub seed: u64,
     /// In this pair (from 1) the person shows nonsense.
     pub nonsense: Option<usize>,
+    /// Starts of the last stage; none said: as many as usual.
+    pub starts: Option<usize>,
 }
 
 /// What came of it.
@@ -220,6 +222,7 @@ impl Lived {
         // One thread: the same map, and a computer with other work does not stop it.
         let course = Course {
             threads: Some(1),
+            starts: self.starts,
             ..Course::hae(Schedule::Fast, None, self.seed)
         };
         let lessons = Lessons::of_gripper(&motion, self.space, course, &Nobody)?;
