@@ -38,7 +38,8 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
         .expect("the log has its index");
     assert_eq!(summary.channels.len(), 14);
     let counts = summary.stats.unwrap().channel_message_counts;
-    assert_eq!(counts.len(), 14, "every channel has messages: {counts:?}");
+    // Ideal sensors have no headings to be unsure of.
+    assert_eq!(counts.len(), 13, "what has messages: {counts:?}");
     assert_eq!(simulation.end(), Some(0));
     let log = log.to_str().unwrap();
     let replayed = json(&support::run(&["replay", log, "--rate", "50", "--json"]));
