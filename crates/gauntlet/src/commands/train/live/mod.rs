@@ -126,7 +126,10 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     }
     tell.say(format_args!("pairs      {}", files.pairs().display()));
     tell.say(format_args!("model      {}", options.out.display()));
-    let report = Command::gauntlet("report").path("--model", &options.out);
+    let mut report = Command::gauntlet("report").path("--model", &options.out);
+    if let Some(poses) = &options.poses {
+        report = report.path("--poses", poses);
+    }
     tell.say(format_args!(
         "next       {}",
         report.then(" draws what it does")
