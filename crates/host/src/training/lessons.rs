@@ -126,8 +126,8 @@ impl Lessons {
         }
     }
 
-    /// What comes after the pairs `start`, all there from the first epoch, and `taught`, one a stage; targets in `passed_over` and near
-    /// them do not.
+    /// What comes after the pairs `start`, all there from the first epoch, and `taught`, one a stage. A target that was shown counts as
+    /// covered, however far the image still is from it: nobody is asked the same pose again. So do targets in `passed_over`, and near them.
     ///
     /// # Errors
     /// A failure that says what is wrong with the data or the pairs.
@@ -170,8 +170,13 @@ impl Lessons {
             self.states.push(stage(trainer)?);
         }
         self.taught = taught.clone();
-        let passed_over = units.x.apply_all(passed_over);
-        let target = trainer.farthest_target(&passed_over);
+        let mut covered = Matrix::zeros(0, self.task.targets.cols);
+        for targets in [&start.targets, &taught.targets, passed_over] {
+            for target in targets.iter_rows() {
+                covered.push(target);
+            }
+        }
+        let target = trainer.farthest_target(&units.x.apply_all(&covered));
         let networks = trainer.networks();
         Ok(Lesson {
             target: target.map(|target| units.x.invert(&target)),
