@@ -34,17 +34,8 @@ pub fn glove() -> Result<(), Failure> {
 
 /// What a page at 60 pictures a second costs the loop, and an hour of it.
 pub fn view() -> Result<(), Failure> {
-    let test = [
-        "test",
-        "--locked",
-        "--package",
-        "gauntlet",
-        "--test",
-        "whole_loop",
-        "--",
-    ];
     let only = ["--ignored", "--nocapture", "a_page_costs_the_loop"];
-    step::run("the page's cost", cargo(&test).args(only))
+    step::run("the page's cost", step::whole_loop().args(only))
 }
 
 /// The ignored tests of one file, one after another.

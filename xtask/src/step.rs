@@ -22,6 +22,19 @@ pub fn cargo(arguments: &[&str]) -> Command {
     command
 }
 
+/// The tool's whole-loop tests; what is added names those that run.
+pub fn whole_loop() -> Command {
+    cargo(&[
+        "test",
+        "--locked",
+        "--package",
+        "gauntlet",
+        "--test",
+        "whole_loop",
+        "--",
+    ])
+}
+
 /// Runs `command` to its end, with its output on the terminal; prints the step's name before and its time after.
 pub fn run(name: &str, command: &mut Command) -> Result<(), Failure> {
     println!("==> {name}");
