@@ -7,9 +7,9 @@ use std::time::{Duration, SystemTime};
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 use clap::{Args, ValueEnum};
 
-use glove::imu;
 use host::clock::rfc3339;
 use host::failure::Failure;
+use host::glove::imu;
 use host::lines::glove::{RAISED, Reading};
 use host::lines::{Model, Settings};
 use host::session::Driving;
@@ -151,8 +151,8 @@ impl DrivingOptions {
             force: self.force,
             rate: self.rate.map(f32::from),
             safe_action: self.safe_action.map(|action| match action {
-                SafeAction::Hold => bridge::SafeAction::Hold,
-                SafeAction::OpenSlowly => bridge::SafeAction::OpenSlowly,
+                SafeAction::Hold => host::bridge::SafeAction::Hold,
+                SafeAction::OpenSlowly => host::bridge::SafeAction::OpenSlowly,
             }),
         }
     }

@@ -9,7 +9,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use trainer::whole_file;
+use host::trainer::whole_file;
 
 use host::failure::Failure;
 use host::words;
@@ -50,7 +50,7 @@ impl Kind {
             // What names neither is of an earlier version.
             Self::Checkpoint => is_safetensors(start, length) && !names(start, MODEL),
             Self::Log => start.starts_with(b"\x89MCAP0\r\n"),
-            Self::Image => start.starts_with(&hae::image::MAGIC),
+            Self::Image => start.starts_with(&host::hae::image::MAGIC),
             Self::Profile => start.starts_with(PROFILE),
             Self::Page => start.starts_with(PAGE),
         }

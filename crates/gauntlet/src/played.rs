@@ -1,10 +1,10 @@
 //! Motion of a hand for the virtual glove, in real time.
 
-use glove::hand::{JOINT_COUNT, LIMITS};
+use host::glove::hand::{JOINT_COUNT, LIMITS};
+use host::trainer::data::Poses;
+use host::trainer::hand::motion::Generator;
 use host::training::motion::{ASSUMED_RATE_HZ, Motion};
 use rig::{FlatFirst, PoseSource};
-use trainer::data::Poses;
-use trainer::hand::motion::Generator;
 
 /// Time over which the end of a recording is led back to its start, seconds.
 const RETURN_S: f64 = 1.0;
@@ -81,7 +81,7 @@ impl PoseSource for Played {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use trainer::data::Matrix;
+    use host::trainer::data::Matrix;
 
     fn recording(time_s: Option<Vec<f64>>) -> Poses {
         Poses {

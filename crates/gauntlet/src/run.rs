@@ -14,8 +14,8 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::event::Kind;
-use glove::hand::Side;
+use host::bridge::event::Kind;
+use host::glove::hand::Side;
 use rustix::event::{PollFd, PollFlags, Timespec, poll};
 
 use crate::live::{Key, Live};
@@ -39,7 +39,7 @@ pub use on_page::drawn;
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);
 /// Pause between two heartbeats of the clutch.
-const HEARTBEAT: Duration = Duration::from_micros(bridge::timing::HEARTBEAT.as_micros());
+const HEARTBEAT: Duration = Duration::from_micros(host::bridge::timing::HEARTBEAT.as_micros());
 /// By then whoever wrote beyond a file's limit was told.
 const FILE_LIMIT_TOLD: Duration = Duration::from_millis(300);
 /// For the hold before Ctrl-Z stops the program.

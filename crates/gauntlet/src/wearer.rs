@@ -6,15 +6,15 @@ pub mod teaching;
 
 use std::fmt;
 
-use glove::calibration::Step;
-use glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_COUNT, Side};
-use glove::imu::UniqueId;
 use host::calibration::virtual_person::VirtualPerson;
+use host::glove::calibration::Step;
+use host::glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_COUNT, Side};
+use host::glove::imu::UniqueId;
+use host::trainer::hand::{Scripted, Space};
+use host::trainer::operator::Operator;
 use rig::PoseSource;
 use rig::glove::{Config, Honest, VirtualGlove};
 use rig::person::{Attitude, Playing, Task, Traits};
-use trainer::hand::{Scripted, Space};
-use trainer::operator::Operator;
 
 pub use calibrating::{Calibrated, Fit};
 

@@ -4,13 +4,13 @@
 
 use std::path::{Path, PathBuf};
 
-use bridge::calibration::Refusal as NotTaken;
-use bridge::protocol::message::Refusal;
-use bridge::{GripperFault, HoldReason, State};
 use gauntlet::cli;
-use gripper::{Activation, Fault};
+use host::bridge::calibration::Refusal as NotTaken;
+use host::bridge::protocol::message::Refusal;
+use host::bridge::{GripperFault, HoldReason, State};
 use host::chip::link::{Address, Error};
 use host::failure::Failure;
+use host::gripper::{Activation, Fault};
 use host::lines::{Model, Settings};
 use host::next::{Command, NextStep};
 use host::session::{Devices, Driven, Driver, Ending, Stopped, refused};
@@ -215,8 +215,8 @@ fn a_refusal_of_a_bridge_names_that_bridge() {
         Refusal::NoSession,
         Refusal::Busy { session: 1 },
         Refusal::Engaged,
-        Refusal::Store(bridge::store::Error::Busy),
-        Refusal::Store(bridge::store::Error::NotBegun),
+        Refusal::Store(host::bridge::store::Error::Busy),
+        Refusal::Store(host::bridge::store::Error::NotBegun),
     ] {
         usable(Error::Refused(refusal).at(&bridge_at()), &chip);
     }

@@ -6,35 +6,35 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use bridge::State;
-use bridge::calibration::{CalibrationState, Try};
-use bridge::clutch::Position;
-use bridge::protocol::message::{
-    Counters, GripperStatus, Health, Hello, PerAxis, Restart, SlotContents, Slots, Status,
-    WeightsKind,
-};
 use gauntlet::results::{
     calibrations, devices, gloves, headings, maps, named, paper, recordings, replays, runs,
     settings,
 };
-use gripper::{Activation, Fault};
+use host::bridge::State;
+use host::bridge::calibration::{CalibrationState, Try};
+use host::bridge::clutch::Position;
+use host::bridge::protocol::message::{
+    Counters, GripperStatus, Health, Hello, PerAxis, Restart, SlotContents, Slots, Status,
+    WeightsKind,
+};
 use host::calibration::guide::{Check, Finding as Found, Joint};
 use host::calibration::profile_file::Quality as Grade;
 use host::chip::link::Flashed;
 use host::diagnose::{Finding, Findings, Verdict};
 use host::failure::{Failure, Told};
+use host::gripper::{Activation, Fault};
 use host::lines::list::Listed;
 use host::next::{Command, Warning, advice};
 use host::recording::Written;
 use host::session::{Stopped, Summary};
 use host::settings::Value;
+use host::trainer::hand::Space;
 use host::training::judgement::Named;
 use host::training::judgement::pairs::PairJudged;
 use host::training::model::Int16;
 use host::training::quality::{Bar, Measured, Quality};
 use host::training::recorded::Seen;
 use serde::Serialize;
-use trainer::hand::Space;
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden")
@@ -97,8 +97,8 @@ fn measured() -> Measured {
     }
 }
 
-fn starts() -> [trainer::algorithm::starts::Start; 2] {
-    let start = |seed, epochs, cost, is_live| trainer::algorithm::starts::Start {
+fn starts() -> [host::trainer::algorithm::starts::Start; 2] {
+    let start = |seed, epochs, cost, is_live| host::trainer::algorithm::starts::Start {
         seed,
         epochs,
         cost: Some(cost),
@@ -181,7 +181,7 @@ fn summary() -> Summary {
         seconds: 20.0,
         bytes_lost: Some([0; 3]),
         ..Summary::default().with(
-            &bridge::telemetry::Counters::default(),
+            &host::bridge::telemetry::Counters::default(),
             host::realtime::Scheduling::Shared,
         )
     }

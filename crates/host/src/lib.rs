@@ -48,3 +48,6 @@ mod toml_file;
 pub mod trace;
 pub mod training;
 pub mod words;
+
+// The device crates and the trainer as this library was built with them: a program on top needs no version of its own.
+pub use {bridge, glove, gripper, hae, trainer};

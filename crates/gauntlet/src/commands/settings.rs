@@ -45,7 +45,7 @@ pub(crate) fn run(options: &Settings) -> Result<()> {
         }
         let folder = path.parent().unwrap_or(&path);
         std::fs::create_dir_all(folder)
-            .and_then(|()| trainer::whole_file::write(&path, preferred.to_toml().as_bytes()))
+            .and_then(|()| host::trainer::whole_file::write(&path, preferred.to_toml().as_bytes()))
             .map_err(|error| {
                 let what = format!("{} is not written: {}", path.display(), words::disk(&error));
                 Failure::new(

@@ -261,7 +261,7 @@ impl Scene for GloveView {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glove::hand::SEGMENT_NAMES;
+    use host::glove::hand::SEGMENT_NAMES;
     use host::words::FINGER_NAMES;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;

@@ -116,7 +116,7 @@ impl GuideView {
             ]));
         }
         if let Some(ratio) = self.ask.ratio {
-            let enough = ratio <= glove::calibration::checks::RATIO_DOUBTFUL;
+            let enough = ratio <= host::glove::calibration::checks::RATIO_DOUBTFUL;
             let color = if enough { Color::Green } else { Color::Yellow };
             // Nothing is turned at 1, enough at 0.80, all of it at about 0.55.
             let turned = ((1.0 - ratio) / 0.45).clamp(0.0, 1.0);
@@ -222,17 +222,17 @@ impl Scene for GuideView {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use glove::calibration::Step;
     use host::calibration::guide::Remark;
+    use host::glove::calibration::Step;
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
 
     fn view() -> GuideView {
-        let us = glove::Duration::from_ticks;
+        let us = host::glove::Duration::from_ticks;
         GuideView {
             elapsed: Duration::from_secs(9),
             ask: Ask {
-                stage: Stage::Doing(glove::Instant::from_ticks(0)),
+                stage: Stage::Doing(host::glove::Instant::from_ticks(0)),
                 step: Step::Turn,
                 number: 2,
                 left: us(6_100_000),

@@ -1,6 +1,6 @@
 //! How sure the heading of each joint is, how fast it drifts, and which are held because of it.
 
-use glove::hand::SEGMENT_COUNT;
+use host::glove::hand::SEGMENT_COUNT;
 use ratatui::style::{Color, Style};
 use ratatui::text::{Line, Span};
 

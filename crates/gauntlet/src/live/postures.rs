@@ -1,6 +1,6 @@
 //! The postures of the guided calibration, drawn with characters. docs/calibrate.md shows the same.
 
-use glove::calibration::Step;
+use host::glove::calibration::Step;
 
 /// Lines of a drawing, at most.
 pub const ROWS: u16 = 7;
@@ -100,7 +100,7 @@ pub fn drawing(step: Step, turning: Option<&str>) -> &'static str {
         (Step::Turn, Some(way)) if way.contains("palm down") => PALM_DOWN,
         (Step::Turn, _) => THUMB_UP,
         (Step::FirstFlat | Step::SecondFlat | Step::LastFlat, _) => FLAT,
-        (Step::Alone(glove::calibration::Finger::Thumb) | Step::Thumb, _) => THUMB,
+        (Step::Alone(host::glove::calibration::Finger::Thumb) | Step::Thumb, _) => THUMB,
         (Step::Alone(_), _) => BEND,
         (Step::Fists, _) => FIST,
         (Step::Free, _) => FREE,

@@ -11,7 +11,7 @@ use ratatui::widgets::Paragraph;
 use ratatui::widgets::canvas::{Canvas, Line as Stroke};
 
 use charts::{Sketch, hand_gripper};
-use glove::hand::JOINT_COUNT;
+use host::glove::hand::JOINT_COUNT;
 use host::stats::seconds;
 use host::teaching::{Ask, FreeAsk, Stage, State};
 

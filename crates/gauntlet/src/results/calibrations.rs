@@ -2,13 +2,13 @@
 
 use std::path::Path;
 
-use glove::calibration::Identity;
-use glove::hand::{SEGMENT_NAMES, Side};
 use host::calibration::Judged;
 use host::calibration::guide::{Finding, Joint};
 use host::calibration::profile_file::{Quality, id_text};
 use host::calibration::profile_store::Entry;
 use host::failure::Told;
+use host::glove::calibration::Identity;
+use host::glove::hand::{SEGMENT_NAMES, Side};
 use host::next::NextStep;
 use serde::Serialize;
 

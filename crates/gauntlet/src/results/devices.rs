@@ -1,6 +1,6 @@
 //! Results of verbs that ask devices: ports, grippers, bridges on chips.
 
-use bridge::protocol::message::{Counters, Health, Hello, Slots, Status};
+use host::bridge::protocol::message::{Counters, Health, Hello, Slots, Status};
 use serde::Serialize;
 
 use host::diagnose::Findings;

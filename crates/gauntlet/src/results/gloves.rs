@@ -2,10 +2,10 @@
 
 use std::fmt::Write;
 
-use glove::hand::SEGMENT_NAMES;
-use glove::imu;
 use host::chip::scans::Counted;
 use host::failure::Told;
+use host::glove::hand::SEGMENT_NAMES;
+use host::glove::imu;
 use host::next::{NextStep, Warning};
 use host::scanning::Snapshot;
 use host::training::recorded::Seen;

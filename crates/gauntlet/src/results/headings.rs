@@ -1,6 +1,6 @@
 //! How sure the headings of a glove's joints are, as data.
 
-use glove::hand::SEGMENT_NAMES;
+use host::glove::hand::SEGMENT_NAMES;
 use host::session::snapshot::Headings;
 use serde::Serialize;
 

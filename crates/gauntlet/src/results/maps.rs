@@ -38,8 +38,8 @@ pub struct Start {
 
 impl Start {
     /// As the trainer tells them.
-    pub fn all(starts: &[trainer::algorithm::starts::Start]) -> Vec<Self> {
-        let start = |start: &trainer::algorithm::starts::Start| Self {
+    pub fn all(starts: &[host::trainer::algorithm::starts::Start]) -> Vec<Self> {
+        let start = |start: &host::trainer::algorithm::starts::Start| Self {
             seed: start.seed.to_string(),
             epochs: start.epochs,
             cost: start.cost.filter(|cost| cost.is_finite()),

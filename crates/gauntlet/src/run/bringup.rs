@@ -3,14 +3,14 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use bridge::calibration::Try;
-use glove::calibration::Step;
+use host::bridge::calibration::Try;
+use host::glove::calibration::Step;
 
 use super::Run;
 use crate::tell::Tell;
 use crate::wearer::Listener;
-use gripper::Activation;
 use host::failure::Failure;
+use host::gripper::Activation;
 use host::session::{Order, Snapshot, kept, refused};
 
 /// For a person to lay the hand flat and hold it still.
@@ -43,7 +43,7 @@ impl Run {
 
     fn take_flat(&mut self, tell: &Tell) -> Result<bool> {
         let before = self.ended();
-        let wait = bridge::Duration::from_micros(WAIT.as_micros() as u64);
+        let wait = host::bridge::Duration::from_micros(WAIT.as_micros() as u64);
         self.order(self.flat(wait))?;
         tell.say(format_args!("{ASK}"));
         let end = Instant::now() + WAIT + ANSWER_WAIT;

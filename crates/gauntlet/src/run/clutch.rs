@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use bridge::clutch::Position;
+use host::bridge::clutch::Position;
 
 use crate::web::PageId;
 use host::session::{Order, Orders, Session};

@@ -162,7 +162,7 @@ fn first_failure<T>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bridge::{HoldReason, State};
+    use host::bridge::{HoldReason, State};
     use host::session::{Driven, Driver};
 
     fn finished(stopped: Result<Stopped>, ending: Option<Ending>, fault: Option<&str>) -> Finished {
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_run_that_ends_with_something_broken_has_failed() {
-        let fault = bridge::GripperFault::ActivationLost(gripper::Activation::Reset);
+        let fault = host::bridge::GripperFault::ActivationLost(host::gripper::Activation::Reset);
         let some = |text: &str| Some(text.to_owned());
         type Broken<'a> = (&'a dyn Fn(&mut Ending), &'a str);
         let broken: [Broken<'_>; 7] = [

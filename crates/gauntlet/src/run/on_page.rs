@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use gripper::kinematics::Model;
-use gripper::registers::two_finger;
+use host::gripper::kinematics::Model;
+use host::gripper::registers::two_finger;
 
 use crate::live::View;
 use crate::web::{Page, Said};

@@ -2,11 +2,11 @@
 
 use std::time::{Duration, Instant};
 
-use bridge::clutch::Position;
-use bridge::{HoldReason, State};
-use glove::hand::Side;
-use gripper::kinematics::Model;
-use gripper::registers::two_finger;
+use host::bridge::clutch::Position;
+use host::bridge::{HoldReason, State};
+use host::glove::hand::Side;
+use host::gripper::kinematics::Model;
+use host::gripper::registers::two_finger;
 
 use super::on_page::OnPage;
 use super::shown;

@@ -3,13 +3,13 @@
 use std::collections::VecDeque;
 use std::time::{Duration, Instant};
 
-use bridge::calibration::{Refusal, Try};
-use bridge::clutch::Position;
-use bridge::event::Kind;
-use bridge::{HoldReason, State};
-use glove::hand::{LIMITS, SEGMENT_COUNT, SEGMENT_NAMES};
-use glove::scan::{Finding, Health};
-use gripper::{Activation, Contact};
+use host::bridge::calibration::{Refusal, Try};
+use host::bridge::clutch::Position;
+use host::bridge::event::Kind;
+use host::bridge::{HoldReason, State};
+use host::glove::hand::{LIMITS, SEGMENT_COUNT, SEGMENT_NAMES};
+use host::glove::scan::{Finding, Health};
+use host::gripper::{Activation, Contact};
 
 use crate::live::{Axis, Bindings, Finger};
 use host::next::Command;
@@ -192,7 +192,7 @@ fn over(kind: &Kind, snapshot: &Snapshot) -> bool {
         Kind::Gripper { .. } => snapshot.gripper_answers,
         Kind::GripperFault(_) => snapshot
             .status
-            .is_some_and(|status| status.fault == gripper::Fault::None),
+            .is_some_and(|status| status.fault == host::gripper::Fault::None),
         _ => false,
     }
 }
@@ -312,7 +312,7 @@ fn standing(snapshot: &Snapshot, hands: &Hands) -> Vec<String> {
         faults.push(kind.to_string());
     }
     if let Some(status) = &snapshot.status {
-        if status.fault != gripper::Fault::None {
+        if status.fault != host::gripper::Fault::None {
             faults.push(words::fault(status.fault));
         }
         if status.activation != Activation::Ready {
@@ -365,8 +365,8 @@ pub(super) fn fingers(snapshot: &Snapshot) -> Vec<Finger> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bridge::calibration::CalibrationState;
-    use gripper::Instant as Time;
+    use host::bridge::calibration::CalibrationState;
+    use host::gripper::Instant as Time;
 
     /// Of a bridge with devices that work, whose glove is not calibrated.
     fn uncalibrated(clutch: Position, state: State) -> Snapshot {
@@ -384,7 +384,7 @@ mod tests {
             on_chip: false,
             frame: None,
             sensors: None,
-            angles: [0.0; glove::hand::JOINT_COUNT],
+            angles: [0.0; host::glove::hand::JOINT_COUNT],
             angles_valid: true,
             distrusted: 0,
             impossible: 0,

@@ -2,9 +2,9 @@
 
 use std::time::{Duration, Instant};
 
-use bridge::State;
-use bridge::calibration::Lack;
-use bridge::clutch::Position;
+use host::bridge::State;
+use host::bridge::calibration::Lack;
+use host::bridge::clutch::Position;
 
 use super::shown::{self, Hands};
 use super::{Options, Run};

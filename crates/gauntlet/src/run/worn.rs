@@ -1,9 +1,9 @@
 //! Whose glove it is, and the flat pose that a key asks for.
 
 use anyhow::Result;
-use bridge::Duration;
-use glove::calibration::{Bound, Step};
-use glove::hand::Side;
+use host::bridge::Duration;
+use host::glove::calibration::{Bound, Step};
+use host::glove::hand::Side;
 
 use super::Run;
 use crate::wearer::Listener;
@@ -62,7 +62,9 @@ impl Run {
     /// A key asks for a flat pose. One that is not taken says no word of having begun.
     pub(super) fn ask_flat(&mut self) {
         let before = self.ended();
-        let taken = self.session.order(self.flat(glove::timing::STILL_WAIT));
+        let taken = self
+            .session
+            .order(self.flat(host::glove::timing::STILL_WAIT));
         if let Some(person) = self.person.as_ref().filter(|_| taken) {
             person.ask(Step::FirstFlat);
             self.asked_flat = Some(before);

@@ -4,12 +4,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Instant as Here, SystemTime};
 
 use anyhow::Result;
-use glove::calibration::{Align, Bound, Verdict};
-use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::headings::{Config, Headings};
-use glove::imu::UniqueId;
-use glove::scan::{self, Frame, Scanner};
-use glove::{Duration, Instant};
+use host::glove::calibration::{Align, Bound, Verdict};
+use host::glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
+use host::glove::headings::{Config, Headings};
+use host::glove::imu::UniqueId;
+use host::glove::scan::{self, Frame, Scanner};
+use host::glove::{Duration, Instant};
 use rig::person::{Attitude, Person, Task};
 use rig::{Clock, MemoryWire, PoseSource};
 use serde::Serialize;

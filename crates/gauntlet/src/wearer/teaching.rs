@@ -4,16 +4,16 @@
 use std::time::{Duration as Time, Instant as Here};
 
 use anyhow::Result;
-use glove::calibration::Bound;
-use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::{self, Scanner};
-use glove::{Duration, Instant};
+use host::glove::calibration::Bound;
+use host::glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
+use host::glove::scan::{self, Scanner};
+use host::glove::{Duration, Instant};
+use host::trainer::algorithm::Schedule;
+use host::trainer::data::Pairs;
+use host::trainer::hand::Space;
 use rig::glove::VirtualGlove;
 use rig::person::{Attitude, Playing, Task};
 use rig::{Clock, MemoryWire, PoseSource};
-use trainer::algorithm::Schedule;
-use trainer::data::Pairs;
-use trainer::hand::Space;
 
 use super::{Wearer, mimicked};
 use crate::played::source;

@@ -2,9 +2,9 @@
 //!
 //! What is added here is flesh: a palm between its knuckles, a body between the fingers' bases.
 
-use glove::hand::shape::{self, THICKNESS};
-use glove::hand::{JOINT_COUNT, SEGMENT_COUNT, Side};
-use gripper::kinematics::Model;
+use host::glove::hand::shape::{self, THICKNESS};
+use host::glove::hand::{JOINT_COUNT, SEGMENT_COUNT, Side};
+use host::gripper::kinematics::Model;
 
 use super::picture::{Link, Part};
 
@@ -127,7 +127,7 @@ fn finger(name: &str) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use gripper::registers::two_finger;
+    use host::gripper::registers::two_finger;
 
     #[test]
     fn every_segment_of_the_hand_and_every_link_of_each_gripper_is_drawn() {

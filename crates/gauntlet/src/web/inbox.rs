@@ -9,7 +9,8 @@ use host::clock::since_boot;
 /// Requests that may wait; who drives takes them every 20 ms.
 const WAITING: usize = 64;
 /// A request to move that waited for longer is passed over: as long as a heartbeat lasts.
-pub const YOUNG: Duration = Duration::from_micros(bridge::timing::HEARTBEAT_TIMEOUT.as_micros());
+pub const YOUNG: Duration =
+    Duration::from_micros(host::bridge::timing::HEARTBEAT_TIMEOUT.as_micros());
 
 /// The same for one that was made on a picture older than this: who made it does not see what is so. A browser that draws ten pictures a
 /// second stays below it.

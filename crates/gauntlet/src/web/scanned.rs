@@ -1,7 +1,7 @@
 //! The hand of a glove that is read by itself, and its sensors, for the page.
 
-use glove::hand::{JOINT_COUNT, SEGMENT_COUNT, SEGMENT_NAMES, Side};
-use glove::scan::Health;
+use host::glove::hand::{JOINT_COUNT, SEGMENT_COUNT, SEGMENT_NAMES, Side};
+use host::glove::scan::Health;
 
 use super::bodies;
 use super::picture::{Hand, Rates, Sensor};

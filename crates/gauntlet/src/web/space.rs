@@ -1,8 +1,8 @@
 //! The gripper's space for the page's map: what of it the hand reaches.
 
+use host::trainer::data::Matrix;
+use host::trainer::hand::{Draw, Space};
 use paper::principal::Principal;
-use trainer::data::Matrix;
-use trainer::hand::{Draw, Space};
 
 use super::picture::Map;
 

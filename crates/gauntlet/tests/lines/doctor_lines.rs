@@ -162,7 +162,7 @@ fn two_devices_that_answer_to_one_question_are_told() {
         let count = 2 * asked.get(5).copied().unwrap_or(0);
         let mut reply = vec![7, 3, count];
         reply.resize(3 + usize::from(count), 0);
-        reply.extend(gripper::rtu::crc16(&reply).to_le_bytes());
+        reply.extend(host::gripper::rtu::crc16(&reply).to_le_bytes());
         reply
     });
     let gripper = VirtualGripper::new(Config::default());
@@ -370,12 +370,12 @@ fn a_serial_device_server_is_no_modbus_tcp_and_told_as_such() {
         let mut bytes = [0; 64];
         while let Ok(count @ 1..) = stream.read(&mut bytes) {
             let asked = &bytes[..count];
-            let crc = gripper::rtu::crc16(&asked[..count - 2]).to_le_bytes();
+            let crc = host::gripper::rtu::crc16(&asked[..count - 2]).to_le_bytes();
             if asked[0] != 9 || asked[count - 2..] != crc {
                 continue;
             }
             let mut reply = vec![9, 3, 2, 0x31, 0];
-            reply.extend(gripper::rtu::crc16(&reply).to_le_bytes());
+            reply.extend(host::gripper::rtu::crc16(&reply).to_le_bytes());
             stream.write_all(&reply).unwrap();
         }
     });

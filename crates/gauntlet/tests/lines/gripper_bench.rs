@@ -115,7 +115,7 @@ fn a_gripper_on_the_network_is_read_and_watched() {
 
 #[test]
 fn every_fault_number_of_every_family_is_a_sentence_and_an_action() {
-    use gripper::Fault;
+    use host::gripper::Fault;
     type Meaning = fn(u8) -> Fault;
     let mut seen = 0;
     for (family, model, meaning) in [

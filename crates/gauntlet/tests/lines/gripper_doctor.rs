@@ -109,7 +109,7 @@ fn an_adapter_that_only_hears_itself_is_told_and_one_with_a_gripper_behind_it_wo
 fn a_device_that_refuses_is_told_with_its_exception() {
     let refusal = Scripted::new(|asked: &[u8]| {
         let mut reply = vec![asked[0], asked[1] | 0x80, 2];
-        reply.extend(gripper::rtu::crc16(&reply).to_le_bytes());
+        reply.extend(host::gripper::rtu::crc16(&reply).to_le_bytes());
         reply
     });
     let (_handle, path) = behind_pty(refusal);
@@ -172,7 +172,7 @@ fn another_unit_at_another_baud_is_found() {
 
 #[test]
 fn every_fault_of_either_family_is_told_with_its_meaning_and_what_to_do() {
-    use gripper::Fault;
+    use host::gripper::Fault;
     type Meaning = fn(u8) -> Fault;
     for (family, codes, meaning) in [
         (

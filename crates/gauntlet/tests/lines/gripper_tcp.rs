@@ -9,10 +9,10 @@ use std::sync::mpsc::{Receiver, channel};
 use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
-use gripper::driver::ThreeFinger;
-use gripper::registers::{COMMAND, STATUS, three_finger};
-use gripper::{Activation, Event, Gripper, Motion, Status};
 use host::clock::Clock;
+use host::gripper::driver::ThreeFinger;
+use host::gripper::registers::{COMMAND, STATUS, three_finger};
+use host::gripper::{Activation, Event, Gripper, Motion, Status};
 use host::interrupt::Interrupt;
 use host::lines::tcp::{Address, Error, Port, UNIT};
 use rig::gripper::{Config, VirtualGripper, tcp};
@@ -40,7 +40,7 @@ fn driver(port: u16) -> (ThreeFinger<Port>, Clock) {
 fn until(
     (driver, clock): &mut (ThreeFinger<Port>, Clock),
     motion: Option<Motion<4>>,
-    mut done: impl FnMut(&ThreeFinger<Port>, Option<Result<Status<4>, gripper::Error>>) -> bool,
+    mut done: impl FnMut(&ThreeFinger<Port>, Option<Result<Status<4>, host::gripper::Error>>) -> bool,
 ) {
     let end = Instant::now() + PATIENCE;
     loop {
@@ -353,11 +353,11 @@ fn a_write_confirmed_for_other_registers_is_a_typed_error() {
 /// The RTU frame of an FC23 whose block is `mark`, as the driver gives it to the port.
 fn marked(mark: u8) -> Vec<u8> {
     let block = [mark; 16];
-    let request = gripper::rtu::Request::ReadWrite {
+    let request = host::gripper::rtu::Request::ReadWrite {
         read_address: STATUS,
         read_quantity: 8,
         write_address: COMMAND,
-        values: gripper::rtu::Registers::from_bytes(&block).unwrap(),
+        values: host::gripper::rtu::Registers::from_bytes(&block).unwrap(),
     };
     let mut frame = vec![0; request.buffer_len()];
     request.emit(UNIT, &mut frame).unwrap();

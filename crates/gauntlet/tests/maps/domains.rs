@@ -2,11 +2,11 @@
 
 use crate::support;
 
+use host::trainer::algorithm::Schedule;
+use host::trainer::data::{Pairs, write_samples};
 use support::samples::{Files, pairs};
 use support::told::interrupted_at;
 use support::{json, refusal, run, text};
-use trainer::algorithm::Schedule;
-use trainer::data::{Pairs, write_samples};
 
 #[test]
 fn any_two_domains_train_and_the_four_measures_come_out() {
@@ -26,7 +26,7 @@ fn any_two_domains_train_and_the_four_measures_come_out() {
         );
     }
     // No normalisation: the model's numbers are those of the files.
-    let model = trainer::model::Model::load(files.path("map.safetensors")).unwrap();
+    let model = host::trainer::model::Model::load(files.path("map.safetensors")).unwrap();
     assert_eq!(
         (model.q.offset, model.q.scale),
         (vec![0.0; 2], vec![1.0; 2])
@@ -91,7 +91,7 @@ fn what_cannot_be_measured_is_null_with_a_word_why() {
         unknown.contains("--volume") && unknown.contains("--truth"),
         "{unknown}"
     );
-    let metadata = trainer::model::Model::load(files.path("map.safetensors"))
+    let metadata = host::trainer::model::Model::load(files.path("map.safetensors"))
         .unwrap()
         .metadata;
     assert!(!metadata.contains_key("vo") && !metadata.contains_key("nmse"));
@@ -129,7 +129,7 @@ fn normalised_columns_are_written_into_the_model() {
     let said =
         json(&files.train_with_truth(&["--normalise", "--volume", "6", "--dim", "2", "--json"]));
     assert!(said["quality"]["volume_occupancy"].as_f64().is_some());
-    let model = trainer::model::Model::load(files.path("map.safetensors")).unwrap();
+    let model = host::trainer::model::Model::load(files.path("map.safetensors")).unwrap();
     assert!(model.x.scale[0] > 1.1 * model.x.scale[1], "{:?}", model.x);
 }
 
@@ -165,7 +165,7 @@ fn every_kind_of_pairs_trains() {
         let said = json(&files.train_with_truth(&all));
         assert_eq!(said["pairs"], expected, "{words:?}");
     }
-    let model = trainer::model::Model::load(files.path("map.safetensors")).unwrap();
+    let model = host::trainer::model::Model::load(files.path("map.safetensors")).unwrap();
     assert_eq!(model.shape(), [2, 20, 2]);
 }
 

@@ -2,9 +2,9 @@
 
 use crate::support;
 
+use host::trainer::data::write_samples;
 use support::samples::{Files, pairs, targets};
 use support::{refusal, run, text};
-use trainer::data::write_samples;
 
 #[test]
 fn a_checkpoint_of_another_data_set_is_refused() {

@@ -4,8 +4,8 @@ use crate::support;
 
 use std::path::{Path, PathBuf};
 
-use hae::image::Element;
-use hae::{Map, quantized};
+use host::hae::image::Element;
+use host::hae::{Map, quantized};
 use support::{Simulation, json, model, poses_file, refusal, run};
 
 fn path(path: &Path) -> &str {
@@ -45,7 +45,7 @@ fn an_image_in_16_bit_integers_is_half_as_long_and_states_its_errors() {
     let (float, length) = read(&float);
     let float = Map::<25, 300, 4>::from_image(&float.0[..length]).unwrap();
     let (bytes, length) = read(&integer);
-    let checked = hae::image::parse_exact(&bytes.0[..length]).unwrap();
+    let checked = host::hae::image::parse_exact(&bytes.0[..length]).unwrap();
     let integer = Map::<25, 300, 4>::from_image(&bytes.0[..length]).unwrap();
     assert_eq!(
         (float.element(), integer.element()),
@@ -54,7 +54,7 @@ fn an_image_in_16_bit_integers_is_half_as_long_and_states_its_errors() {
     // The errors that were told are those of the image, and what both maps really differ by over the poses.
     let stated = quantized::errors(&bytes.0[..length], &checked).unwrap();
     let mut measured = [0.0f32; 4];
-    let frames = trainer::data::read_poses(&poses, &support::JOINTS)
+    let frames = host::trainer::data::read_poses(&poses, &support::JOINTS)
         .unwrap()
         .rows;
     for row in frames.iter_rows() {

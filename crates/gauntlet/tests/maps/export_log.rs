@@ -4,14 +4,14 @@ use crate::support;
 
 use std::path::{Path, PathBuf};
 
-use glove::hand::{LIMITS, SEGMENT_COUNT, Side};
-use gripper::Instant;
 use host::clock::Clock;
+use host::glove::hand::{LIMITS, SEGMENT_COUNT, Side};
+use host::gripper::Instant;
 use host::lines::Model;
 use host::recording::{Drawn, SessionLog};
 use host::session::record::{Command, Frame, Imu, Record, queue};
+use host::trainer::hand::motion::Generator;
 use support::{json, model, refusal, run};
-use trainer::hand::motion::Generator;
 
 const ROWS: u64 = 120;
 
@@ -29,7 +29,7 @@ fn log(folder: &Path, side: Side) -> PathBuf {
         let imu = Imu {
             quaternion: [1.0, 0.0, 0.0, 0.0],
             stamp: at,
-            health: glove::scan::Health::Good,
+            health: host::glove::scan::Health::Good,
         };
         feed.hand(Record::Frame(Box::new(Frame {
             at,
@@ -41,7 +41,7 @@ fn log(folder: &Path, side: Side) -> PathBuf {
             following: false,
             headings: None,
         })));
-        let motion = gripper::Motion {
+        let motion = host::gripper::Motion {
             position: [row as u8, 2, 3, 4],
             speed: [255; 4],
             force: [64; 4],

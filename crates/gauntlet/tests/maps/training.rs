@@ -236,8 +236,8 @@ fn a_training_that_is_done_is_kept_though_its_measures_are_not_waited_for() {
         (0..count).map(point).collect()
     };
     let samples = |name: &str, prefix: &str, count: usize| {
-        let matrix = trainer::data::Matrix::from_rows(&spiral(count));
-        trainer::data::write_samples(file(name), &matrix, prefix).unwrap();
+        let matrix = host::trainer::data::Matrix::from_rows(&spiral(count));
+        host::trainer::data::write_samples(file(name), &matrix, prefix).unwrap();
     };
     // Measuring takes seconds, training does not.
     samples("q.csv", "q", 30_000);
@@ -283,7 +283,7 @@ fn a_training_that_is_done_is_kept_though_its_measures_are_not_waited_for() {
     let said = refusal(&output, 1);
     assert!(said.contains("without its measures"), "{said}");
     assert!(support::text(&output.stderr).contains("try: `gauntlet eval --model"));
-    let model = trainer::model::Model::load(&out).unwrap();
+    let model = host::trainer::model::Model::load(&out).unwrap();
     assert_eq!(model.metadata["pairs"], "2");
     assert!(!model.metadata.contains_key("dbar"));
 }

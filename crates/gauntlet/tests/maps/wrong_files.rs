@@ -144,7 +144,7 @@ fn a_model_of_another_shape_is_refused_with_both_shapes() {
     let folder = tempfile::tempdir().unwrap();
     let poses = poses_file(folder.path(), 60);
     let other = folder.path().join("other.safetensors");
-    let network = |inputs: usize, hidden: usize, outputs: usize| trainer::network::Network {
+    let network = |inputs: usize, hidden: usize, outputs: usize| host::trainer::network::Network {
         inputs,
         hidden,
         outputs,
@@ -154,11 +154,11 @@ fn a_model_of_another_shape_is_refused_with_both_shapes() {
         b2: vec![0.0; outputs],
     };
     let save = |inputs, hidden, outputs| {
-        trainer::model::Model {
+        host::trainer::model::Model {
             f: network(inputs, hidden, outputs),
             g: network(outputs, hidden, inputs),
-            q: trainer::model::Normalisation::identity(inputs),
-            x: trainer::model::Normalisation::identity(outputs),
+            q: host::trainer::model::Normalisation::identity(inputs),
+            x: host::trainer::model::Normalisation::identity(outputs),
             metadata: Default::default(),
         }
         .save(&other)

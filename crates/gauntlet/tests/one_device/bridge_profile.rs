@@ -9,20 +9,20 @@ use std::path::Path;
 use std::process::{Output, Stdio};
 use std::sync::{Arc, Mutex};
 
-use bridge::State;
-use bridge::calibration::{CalibrationState, Refusal as NotTaken, Try};
-use bridge::clutch::Position;
-use bridge::protocol::frame::{self, Decoder};
-use bridge::protocol::message::{
+use host::bridge::State;
+use host::bridge::calibration::{CalibrationState, Refusal as NotTaken, Try};
+use host::bridge::clutch::Position;
+use host::bridge::protocol::frame::{self, Decoder};
+use host::bridge::protocol::message::{
     Answer, Call, Counters, FromBridge, Health, Hello, PROFILE_CHUNK, ProfilePart, Refusal, Reply,
     Request, Restart, SensorIds, SlotContents, Slots, Status, VERSION,
 };
-use bridge::store::profile::Error;
-use glove::calibration::{Bound, Profile};
-use glove::hand::Side;
-use glove::imu::UniqueId;
+use host::bridge::store::profile::Error;
 use host::calibration::Kept;
 use host::calibration::profile_file::{MadeBy, Quality};
+use host::glove::calibration::{Bound, Profile};
+use host::glove::hand::Side;
+use host::glove::imu::UniqueId;
 
 use support::{command, finish, json, refusal, text};
 

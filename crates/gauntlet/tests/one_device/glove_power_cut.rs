@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use glove::scan::{Config, Scanner};
 use host::clock::Clock;
+use host::glove::scan::{Config, Scanner};
 use host::interrupt::Interrupt;
 use host::lines::port::{BAUD, Port};
 use rig::glove::VirtualGlove;

@@ -7,11 +7,11 @@ use std::process::Stdio;
 use std::time::{Duration, Instant};
 
 use embedded_io::{Read, ReadReady, Write};
-use glove::hand::flat::{FlatHand, Progress};
-use glove::hand::{Calibration, Side, joint_angles};
-use glove::scan::{Config, Scanner};
-use glove::timing;
 use host::clock::Clock;
+use host::glove::hand::flat::{FlatHand, Progress};
+use host::glove::hand::{Calibration, Side, joint_angles};
+use host::glove::scan::{Config, Scanner};
+use host::glove::timing;
 use host::lines::port::{BAUD, Port};
 use rig::skip::{Need, skipped};
 use support::{Simulation, command, finish, json, kept_waiting, model};
@@ -42,7 +42,7 @@ fn calibrate_and_watch(path: &str) -> f32 {
     let clock = Clock::start();
     let mut flat = FlatHand::start(
         clock.now(),
-        glove::Duration::from_ticks(10_000_000),
+        host::glove::Duration::from_ticks(10_000_000),
         &Calibration::identity(),
     );
     let calibration = loop {
@@ -58,7 +58,7 @@ fn calibrate_and_watch(path: &str) -> f32 {
             Progress::Refused(refusal) => panic!("{refusal}"),
         }
     };
-    assert!(timing::STILL_FOR < glove::Duration::from_ticks(3_000_000));
+    assert!(timing::STILL_FOR < host::glove::Duration::from_ticks(3_000_000));
     let (end, mut furthest) = (Instant::now() + Duration::from_secs(6), 0.0f32);
     while Instant::now() < end {
         std::thread::sleep(Duration::from_micros(300));

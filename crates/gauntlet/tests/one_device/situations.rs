@@ -19,8 +19,8 @@ use std::os::unix::net::UnixListener;
 use std::process::Output;
 use std::time::{Duration, Instant};
 
-use bridge::protocol::frame::{self, Decoder};
-use bridge::protocol::message::{
+use host::bridge::protocol::frame::{self, Decoder};
+use host::bridge::protocol::message::{
     Answer, Call, FromBridge, Hello, Reply, Request, SlotContents, Slots, VERSION, WeightsKind,
 };
 use rig::Device;
@@ -81,7 +81,7 @@ fn a_move_is_done_where_the_fingers_are_and_not_where_a_flag_says_so() {
         if frame.len() >= 8 && matches!(frame[1], 3 | 4 | 23) {
             frame[3] |= 0xC0;
             let body = frame.len() - 2;
-            let crc = gripper::rtu::crc16(&frame[..body]).to_le_bytes();
+            let crc = host::gripper::rtu::crc16(&frame[..body]).to_le_bytes();
             frame[body..].copy_from_slice(&crc);
         }
         at_once(frame)

@@ -120,7 +120,7 @@ pub fn refusal(output: &Output, code: i32) -> String {
 }
 
 /// Joint names as files carry them, in order.
-pub const JOINTS: [&str; 25] = glove::hand::JOINT_NAMES;
+pub const JOINTS: [&str; 25] = host::glove::hand::JOINT_NAMES;
 
 /// A poses file of `rows` rows from the generator, and the same with a change.
 pub fn poses_file(folder: &Path, rows: usize) -> PathBuf {
@@ -130,7 +130,8 @@ pub fn poses_file(folder: &Path, rows: usize) -> PathBuf {
 }
 
 pub fn poses_text(rows: usize) -> String {
-    let frames = trainer::hand::motion::Generator::new(&glove::hand::LIMITS, 5).frames(rows, 9.2);
+    let frames = host::trainer::hand::motion::Generator::new(&host::glove::hand::LIMITS, 5)
+        .frames(rows, 9.2);
     let mut text = format!("time_s,{}\n", JOINTS.join(","));
     for (index, row) in frames.iter_rows().enumerate() {
         let values: Vec<String> = row.iter().map(f32::to_string).collect();

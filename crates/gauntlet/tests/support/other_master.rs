@@ -10,7 +10,7 @@ pub fn command(block: &[u8]) -> Vec<u8> {
     let registers = u8::try_from(block.len() / 2).unwrap();
     let mut frame = vec![9, 0x10, 0x03, 0xE8, 0, registers, 2 * registers];
     frame.extend(block);
-    frame.extend(gripper::rtu::crc16(&frame).to_le_bytes());
+    frame.extend(host::gripper::rtu::crc16(&frame).to_le_bytes());
     frame
 }
 

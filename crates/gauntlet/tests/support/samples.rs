@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use trainer::data::{Matrix, Pairs, write_pairs, write_samples};
+use host::trainer::data::{Matrix, Pairs, write_pairs, write_samples};
 
 use super::{refusal, run, text};
 

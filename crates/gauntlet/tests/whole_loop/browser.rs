@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use gauntlet::web::picture::{Action, Axis, Clutch, Gripper, Guide, Headline, Rates, Teach, Tone};
 use gauntlet::web::{self, Known, Page, Picture, Wish};
-use glove::hand::{JOINT_COUNT, Side};
-use glove::scan::Health;
-use gripper::kinematics::Model;
+use host::glove::hand::{JOINT_COUNT, Side};
+use host::glove::scan::Health;
+use host::gripper::kinematics::Model;
 use support::browser::Browser;
 use support::page::PATIENCE;
 

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
+use host::hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use rig::glove::VirtualGlove;
 use rig::gripper::{Config, Family, VirtualGripper, tcp};
 use serde_json::Value;
@@ -18,7 +18,7 @@ use support::{devices, finish, json, kept_waiting, refusal, run, start, text};
 
 /// A map of one output: the proximal flexion of the index finger, 1 rad from open to closed.
 fn one_output(folder: &Path) -> PathBuf {
-    const HIDDEN: usize = bridge::HIDDEN;
+    const HIDDEN: usize = host::bridge::HIDDEN;
     let (mut w1, b1) = (vec![0.0; HIDDEN * 25], vec![0.0; HIDDEN]);
     let mut w2 = vec![0.0; HIDDEN];
     (w1[5], w2[0]) = (1.0, 255.0);

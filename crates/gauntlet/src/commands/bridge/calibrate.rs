@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::Result;
-use bridge::calibration::{CalibrationState, Refusal, Try};
-use bridge::protocol::message::Health;
+use host::bridge::calibration::{CalibrationState, Refusal, Try};
+use host::bridge::protocol::message::Health;
 
 use super::args::BridgeAt;
 use super::drive::{Flat, start};

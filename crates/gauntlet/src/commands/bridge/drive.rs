@@ -4,7 +4,7 @@ use std::sync::mpsc::SyncSender;
 use std::time::Duration;
 
 use anyhow::Result;
-use bridge::protocol::message::Sample;
+use host::bridge::protocol::message::Sample;
 
 use super::args::BridgeAt;
 use crate::results::{self, runs};

@@ -1,6 +1,6 @@
 //! A recording of a hand from a bridge on a chip: its telemetry samples as rows of a poses file.
 
-use bridge::protocol::message::Sample;
+use host::bridge::protocol::message::Sample;
 
 use host::recording::poses::Row;
 
@@ -27,8 +27,8 @@ pub(super) fn rows() -> impl FnMut(Sample) -> Option<Row> + Send {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use bridge::State;
-    use glove::hand::JOINT_COUNT;
+    use host::bridge::State;
+    use host::glove::hand::JOINT_COUNT;
 
     #[test]
     fn a_frame_that_gave_no_angles_is_no_row_of_old_ones() {

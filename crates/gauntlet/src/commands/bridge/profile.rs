@@ -4,7 +4,7 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::calibration::{Bound, Misfit};
+use host::glove::calibration::{Bound, Misfit};
 
 use super::args::BridgeAt;
 use crate::results::{self, calibrations, devices};
@@ -138,11 +138,11 @@ pub(super) fn forget(at: &BridgeAt) -> Result<()> {
         false => format_args!("profile    the bridge kept none"),
     });
     if at.json {
-        let calibration = bridge::calibration::CalibrationState {
+        let calibration = host::bridge::calibration::CalibrationState {
             is_calibrated: health.calibration.is_calibrated && !was_there,
             ..health.calibration
         };
-        let health = bridge::protocol::message::Health {
+        let health = host::bridge::protocol::message::Health {
             calibration,
             ..health
         };

@@ -1,9 +1,9 @@
 //! What a bridge does, what its slots hold, and its counters.
 
 use anyhow::Result;
-use bridge::calibration::Try;
-use bridge::protocol::message::{Health, Restart, Status};
-use gripper::{Activation, Fault};
+use host::bridge::calibration::Try;
+use host::bridge::protocol::message::{Health, Restart, Status};
+use host::gripper::{Activation, Fault};
 
 use super::args::BridgeAt;
 use super::profile;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use crate::options::log_name;
 use clap::Args;
-use glove::hand::Side;
+use host::glove::hand::Side;
 
 use crate::commands::glove::GloveAt;
 use crate::commands::teleop::Hand as WhichHand;

@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use glove::calibration::{Bound, Step};
-use glove::headings::NotFlat;
+use host::glove::calibration::{Bound, Step};
+use host::glove::headings::NotFlat;
 
 use super::args::Calibrate;
 use super::source::{Place, Source};
@@ -125,7 +125,7 @@ fn known(options: &Calibrate, place: &Place<'_>, source: &mut Source) -> Result<
 }
 
 fn tilted(segment: u8, by: f32) -> Finding {
-    let name = glove::hand::SEGMENT_NAMES
+    let name = host::glove::hand::SEGMENT_NAMES
         .get(usize::from(segment))
         .copied();
     Finding {

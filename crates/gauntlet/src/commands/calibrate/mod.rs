@@ -12,9 +12,9 @@ use std::path::Path;
 use std::time::SystemTime;
 
 use anyhow::Result;
-use glove::calibration::{Bound, Misfit, Verdict};
-use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
-use glove::imu::UniqueId;
+use host::glove::calibration::{Bound, Misfit, Verdict};
+use host::glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
+use host::glove::imu::UniqueId;
 
 use crate::commands::bridge::flat_pose;
 use crate::line_log::LineLog;

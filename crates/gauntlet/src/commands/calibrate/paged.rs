@@ -1,7 +1,7 @@
 //! The guided session on the page.
 
-use glove::hand::{JOINT_COUNT, Side};
 use host::calibration::guide::{PARTS, Stage, plan};
+use host::glove::hand::{JOINT_COUNT, Side};
 
 use super::session::Session;
 use crate::live::Key;
@@ -43,7 +43,7 @@ fn picture(view: &GuideView, over: bool) -> Picture {
         Stage::Over if view.good => ("done", Tone::Good),
         Stage::Over => ("not good enough", Tone::Bad),
     };
-    let seconds = |time: glove::Duration| time.as_ticks() as f32 / 1e6;
+    let seconds = |time: host::glove::Duration| time.as_ticks() as f32 / 1e6;
     let (left, of) = (seconds(ask.left), seconds(ask.of));
     let go = match over {
         true => "keep it (space)",

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::calibration::{Unfinished, Verdict};
-use glove::hand::Side;
+use host::glove::calibration::{Unfinished, Verdict};
+use host::glove::hand::Side;
 
 use super::source::Source;
 use crate::live::guided::GuideView;

@@ -4,8 +4,8 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
-use glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
-use glove::imu::UniqueId;
+use host::glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
+use host::glove::imu::UniqueId;
 
 use crate::commands::glove::GloveAt;
 use crate::line_log::LineLog;
@@ -122,7 +122,7 @@ pub(in crate::commands) enum Source {
 
 impl Source {
     /// The time, on the clock of the scans' stamps.
-    pub fn now(&self) -> glove::Instant {
+    pub fn now(&self) -> host::glove::Instant {
         match self {
             Self::Port { clock, .. } => clock.now(),
             Self::Chip { scans, .. } => scans.now(),

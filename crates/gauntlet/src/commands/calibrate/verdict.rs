@@ -1,7 +1,7 @@
 //! What a calibration came to, for a person.
 
-use glove::calibration::Verdict;
-use glove::hand::Side;
+use host::glove::calibration::Verdict;
+use host::glove::hand::Side;
 
 use host::calibration::Judged;
 

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use anyhow::Result;
-use glove::hand::Side;
+use host::glove::hand::Side;
 
 use super::parts::{self, Stage, Started, Virtual};
 use super::person;

@@ -27,7 +27,7 @@ use host::training::hand::MOST_FRAMES;
 use host::training::motion::Motion;
 use parts::{Stage, Started};
 
-use trainer::spread::spread;
+use host::trainer::spread::spread;
 
 pub use args::Demo;
 

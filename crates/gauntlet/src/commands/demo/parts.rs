@@ -4,13 +4,13 @@ use std::any::Any;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::calibration::Bound;
+use host::glove::calibration::Bound;
+use host::trainer::algorithm::Schedule;
+use host::trainer::hand::Space;
 use rig::Device;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::pty::{Handle, PtyDevice};
-use trainer::algorithm::Schedule;
-use trainer::hand::Space;
 
 use super::args::Demo;
 use crate::commands::simulate;

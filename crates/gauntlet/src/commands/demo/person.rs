@@ -1,7 +1,7 @@
 //! The demo's virtual person gets its profile: from the guided session on the virtual clock or in real time, or from a file.
 
 use anyhow::Result;
-use glove::calibration::Bound;
+use host::glove::calibration::Bound;
 use rig::glove::VirtualGlove;
 
 use super::parts::{Stage, Virtual};

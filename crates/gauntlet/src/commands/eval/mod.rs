@@ -6,10 +6,10 @@ mod show;
 use std::path::Path;
 
 use anyhow::Result;
-use trainer::data::{Matrix, require_rows};
-use trainer::hand::{Draw, Space};
-use trainer::measures::NEIGHBOURS;
-use trainer::model::Model;
+use host::trainer::data::{Matrix, require_rows};
+use host::trainer::hand::{Draw, Space};
+use host::trainer::measures::NEIGHBOURS;
+use host::trainer::model::Model;
 
 pub use args::Eval;
 

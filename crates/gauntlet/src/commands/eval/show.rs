@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use trainer::model::Model;
+use host::trainer::model::Model;
 
 use crate::say;
 use host::training::judgement::Judgement;

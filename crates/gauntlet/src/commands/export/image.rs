@@ -1,7 +1,7 @@
 //! A model's weights as the image a bridge takes, in a file.
 
 use anyhow::Result;
-use trainer::whole_file;
+use host::trainer::whole_file;
 
 use super::args::Export;
 use crate::outputs::{self, Kind};

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use trainer::whole_file;
+use host::trainer::whole_file;
 
 use super::args::Export;
 use crate::outputs;

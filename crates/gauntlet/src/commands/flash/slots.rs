@@ -1,6 +1,6 @@
 //! What the two slots of a bridge hold, in words.
 
-use bridge::protocol::message::{SlotContents, Slots, WeightsKind};
+use host::bridge::protocol::message::{SlotContents, Slots, WeightsKind};
 
 /// What both slots hold, a line each.
 pub(in crate::commands) fn slot_lines(slots: &Slots) -> Vec<String> {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use glove::hand::Side;
+use host::glove::hand::Side;
 
 use super::speed;
 use crate::commands::teleop::Hand as WhichHand;

@@ -3,7 +3,7 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::calibration::Step;
+use host::glove::calibration::Step;
 
 use crate::run::{ASK_FLAT, FLAT_WAIT};
 use crate::tell::Tell;

@@ -5,9 +5,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
-use glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_NAMES};
-use glove::imu;
-use glove::scan::{Health, State};
+use host::glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_NAMES};
+use host::glove::imu;
+use host::glove::scan::{Health, State};
 
 use super::at::GloveAt;
 use crate::live::glove::{GloveView, Sensor};

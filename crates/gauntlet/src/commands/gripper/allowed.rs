@@ -1,7 +1,7 @@
 //! Whether a gripper may be told to move, and to hold.
 
-use gripper::registers::Severity;
-use gripper::{Activation, Fault, Status};
+use host::gripper::registers::Severity;
+use host::gripper::{Activation, Fault, Status};
 
 use super::args::Target;
 use host::failure::Failure;

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use clap::{Args, Subcommand, ValueEnum};
-use gripper::registers::three_finger;
+use host::gripper::registers::three_finger;
 
 use crate::options::{LineOptions, model_parser, run_time};
 use host::lines::{Line, Model, Settings};
@@ -111,9 +111,9 @@ impl Target {
     }
 
     /// How to set up a driver for it on `line`.
-    pub fn driver_config(&self, line: &Line) -> gripper::driver::Config {
+    pub fn driver_config(&self, line: &Line) -> host::gripper::driver::Config {
         let config = line.driver_config(self.settings());
-        gripper::driver::Config {
+        host::gripper::driver::Config {
             check_family: config.check_family && !self.trust_model,
             ..config
         }
@@ -154,7 +154,7 @@ impl Target {
     }
 
     /// What to do about a fault, with the commands for it.
-    pub fn cure(&self, fault: gripper::Fault) -> NextStep {
+    pub fn cure(&self, fault: host::gripper::Fault) -> NextStep {
         host::diagnose::cure(fault, |verb| {
             self.named_in(Command::gauntlet(verb), self.settings())
         })

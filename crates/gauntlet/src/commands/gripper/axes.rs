@@ -1,8 +1,8 @@
 //! Which axes a move's numbers are for, and the next step of each.
 
-use bridge::supervisor::limits;
-use gripper::driver::Control;
-use gripper::{Activation, Status};
+use host::bridge::supervisor::limits;
+use host::gripper::driver::Control;
+use host::gripper::{Activation, Status};
 
 /// Which axes the numbers on the command line are for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -3,10 +3,10 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use gripper::driver::{Control, Outcome, Task, ThreeFinger, TwoFinger};
-use gripper::registers::{three_finger, two_finger};
-use gripper::travel::Speed;
-use gripper::{Event, Gripper, Status, link};
+use host::gripper::driver::{Control, Outcome, Task, ThreeFinger, TwoFinger};
+use host::gripper::registers::{three_finger, two_finger};
+use host::gripper::travel::Speed;
+use host::gripper::{Event, Gripper, Status, link};
 
 use host::clock::Clock;
 use host::clock::ticks;
@@ -19,10 +19,10 @@ pub const ANSWER_WAIT: Duration = Duration::from_secs(3);
 /// Pause between two looks at the line.
 const LOOK: Duration = Duration::from_millis(1);
 /// A longer one the process did not choose.
-const STALL: gripper::Duration = gripper::Duration::from_millis(250);
+const STALL: host::gripper::Duration = host::gripper::Duration::from_millis(250);
 
 /// What the verbs need of a driver beyond [`Gripper`].
-pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
+pub trait Bench<const X: usize>: Gripper<X, Error = host::gripper::Error> {
     /// Registers' bytes of the newest status.
     fn raw(&self) -> Option<Vec<u8>>;
     /// Whether the gripper repeats the newest motion.
@@ -46,7 +46,7 @@ pub trait Bench<const X: usize>: Gripper<X, Error = gripper::Error> {
     /// The greatest speed its axes can have.
     fn speed(&self) -> Speed;
     /// How late the latest of its late answers came; none where none was.
-    fn lateness(&self) -> Option<gripper::Duration>;
+    fn lateness(&self) -> Option<host::gripper::Duration>;
     /// What is wrong with the line, where it can tell better than the driver.
     fn line_error(&mut self) -> Option<tcp::Error>;
     /// Finds out whether the gripper is of this family before anything else.
@@ -108,7 +108,7 @@ impl Bench<4> for ThreeFinger<Line> {
     fn speed(&self) -> Speed {
         Speed::THREE_FINGER
     }
-    fn lateness(&self) -> Option<gripper::Duration> {
+    fn lateness(&self) -> Option<host::gripper::Duration> {
         self.link().lateness()
     }
     fn line_error(&mut self) -> Option<tcp::Error> {
@@ -166,7 +166,7 @@ impl Bench<1> for TwoFinger<Line> {
     fn speed(&self) -> Speed {
         Speed::of_model(self.model())
     }
-    fn lateness(&self) -> Option<gripper::Duration> {
+    fn lateness(&self) -> Option<host::gripper::Duration> {
         self.link().lateness()
     }
     fn line_error(&mut self) -> Option<tcp::Error> {
@@ -206,8 +206,8 @@ impl Waiter {
         time: Duration,
         mut step: impl FnMut(
             &mut B,
-            gripper::Instant,
-            Option<Result<Status<X>, gripper::Error>>,
+            host::gripper::Instant,
+            Option<Result<Status<X>, host::gripper::Error>>,
         ) -> ControlFlow<T>,
     ) -> Option<T> {
         let mut left = ticks(time).as_ticks();
@@ -257,7 +257,7 @@ impl Waiter {
         &self,
         driver: &mut B,
         patience: Duration,
-    ) -> Result<Status<X>, Option<gripper::Error>> {
+    ) -> Result<Status<X>, Option<host::gripper::Error>> {
         let mut last = None;
         self.pump(
             driver,
@@ -266,12 +266,15 @@ impl Waiter {
                 Some(Ok(status)) if driver.is_identified() => ControlFlow::Break(Some(status)),
                 Some(Err(error)) => {
                     // What tells most is kept.
-                    if !matches!(last, Some(gripper::Error::Link(link::Error::Shifted(_)))) {
+                    if !matches!(
+                        last,
+                        Some(host::gripper::Error::Link(link::Error::Shifted(_)))
+                    ) {
                         last = Some(error);
                     }
                     match error {
                         // It will not become another one.
-                        gripper::Error::OtherGripper(_) => ControlFlow::Break(None),
+                        host::gripper::Error::OtherGripper(_) => ControlFlow::Break(None),
                         _ => ControlFlow::Continue(()),
                     }
                 }

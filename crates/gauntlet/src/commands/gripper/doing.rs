@@ -1,8 +1,8 @@
 //! A verb under way at a gripper.
 
 use anyhow::Result;
-use gripper::registers::Severity;
-use gripper::{Activation, Status};
+use host::gripper::registers::Severity;
+use host::gripper::{Activation, Status};
 
 use super::args::{Grasp, Target};
 use super::bench::{Bench, Waiter};

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use gripper::travel::Verdict;
-use gripper::{Contact, Event, Gripper};
+use host::gripper::travel::Verdict;
+use host::gripper::{Contact, Event, Gripper};
 
 use super::bench::Bench;
 use super::doing::Doing;

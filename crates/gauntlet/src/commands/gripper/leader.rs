@@ -2,9 +2,9 @@
 
 use std::time::Duration;
 
-use gripper::assurance::Assurance;
-use gripper::travel::{Plausibility, Verdict};
-use gripper::{Activation, Fault, Instant, Motion, Status, timing};
+use host::gripper::assurance::Assurance;
+use host::gripper::travel::{Plausibility, Verdict};
+use host::gripper::{Activation, Fault, Instant, Motion, Status, timing};
 
 use super::allowed::{can_hold, may_move};
 use super::args::Move;
@@ -22,21 +22,21 @@ pub(super) const LEAD: u8 = 40;
 /// The least it leads by, however uncertain a slow line makes its position.
 const LEAST_LEAD: u8 = 10;
 /// An axis that has stood for so long is where it says.
-const SURE: gripper::Duration = gripper::Duration::from_millis(200);
+const SURE: host::gripper::Duration = host::gripper::Duration::from_millis(200);
 /// Without an answer for this long the move is given up.
 pub(super) const SILENCE: Duration = Duration::from_secs(1);
 /// The same without a whole status in time, where answers come: after late ones the driver asks short questions for
 /// [`timing::MEMORY`].
-const NO_STATUS: gripper::Duration = gripper::Duration::from_secs(3);
+const NO_STATUS: host::gripper::Duration = host::gripper::Duration::from_secs(3);
 /// Nobody looked for this long: what was seen before is of then, and the positions are looked at anew.
-pub(super) const STALL: gripper::Duration = timing::STALE_MOTION;
+pub(super) const STALL: host::gripper::Duration = timing::STALE_MOTION;
 /// Nobody looked for this long: whoever began the move may be elsewhere by now, and it ends. As long as a clutch stays
 /// closed without a sign of its person.
-const STOOD: gripper::Duration = gripper::Duration::from_secs(1);
+const STOOD: host::gripper::Duration = host::gripper::Duration::from_secs(1);
 /// Statuses that must agree after a doubted one before the next is led from.
 const SUSPECT: u8 = 2;
 /// Positions that have not become believable for this long will not.
-const DOUBT: gripper::Duration = gripper::Duration::from_secs(3);
+const DOUBT: host::gripper::Duration = host::gripper::Duration::from_secs(3);
 
 /// How a move ended.
 pub(super) enum End<const X: usize> {
@@ -52,7 +52,7 @@ pub(super) enum End<const X: usize> {
     /// Its positions cannot be believed: there is nothing that a hold could be made from.
     Doubted(Failure),
     /// The process stood still for so long.
-    Stood(gripper::Duration),
+    Stood(host::gripper::Duration),
     /// Somebody asked for a pause (Ctrl-Z).
     Suspended,
     /// No status came for [`SILENCE`].
@@ -65,7 +65,7 @@ pub(super) struct Leader<'a, const X: usize> {
     pub(super) axes: Axes,
     pub(super) target: [u8; X],
     pub(super) names: [&'static str; X],
-    patience: gripper::Duration,
+    patience: host::gripper::Duration,
     pub(super) judge: Plausibility<X>,
     pub(super) assurance: Assurance<X>,
     pub(super) progress: Progress<X>,
@@ -102,7 +102,7 @@ impl<'a, const X: usize> Leader<'a, X> {
     ) -> Self {
         let now = doing.waiter.clock.now();
         let patience = ticks(doing.target.settings().patience());
-        let patience = gripper::Duration::from_ticks(4 * patience.as_ticks());
+        let patience = host::gripper::Duration::from_ticks(4 * patience.as_ticks());
         Self {
             options,
             axes,
@@ -132,7 +132,7 @@ impl<'a, const X: usize> Leader<'a, X> {
         &mut self,
         driver: &mut B,
         now: Instant,
-        heard: Option<Result<Status<X>, gripper::Error>>,
+        heard: Option<Result<Status<X>, host::gripper::Error>>,
     ) -> Option<End<X>> {
         let stood = since(now, self.looked);
         self.looked = now;

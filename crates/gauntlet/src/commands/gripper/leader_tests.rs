@@ -4,11 +4,11 @@ use super::super::args::Target;
 use super::super::bench::Waiter;
 use super::*;
 use crate::tell::Tell;
-use gripper::driver::{Control, Outcome, Task};
-use gripper::registers::three_finger;
-use gripper::travel::Speed;
-use gripper::{Contact, Event, Gripper};
 use host::clock::Clock;
+use host::gripper::driver::{Control, Outcome, Task};
+use host::gripper::registers::three_finger;
+use host::gripper::travel::Speed;
+use host::gripper::{Contact, Event, Gripper};
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::lines::tcp;
@@ -44,8 +44,8 @@ impl<F: FnMut(u64, u8) -> u8> Scripted<F> {
 }
 
 impl<F: FnMut(u64, u8) -> u8> Gripper<1> for Scripted<F> {
-    type Error = gripper::Error;
-    fn poll(&mut self, now: Instant) -> Option<Event<1, gripper::Error>> {
+    type Error = host::gripper::Error;
+    fn poll(&mut self, now: Instant) -> Option<Event<1, host::gripper::Error>> {
         let at = now.as_ticks();
         if at < self.next {
             return None;
@@ -81,8 +81,8 @@ impl<F: FnMut(u64, u8) -> u8> Gripper<1> for Scripted<F> {
     fn next_due(&self) -> Instant {
         Instant::from_ticks(self.next)
     }
-    fn counters(&self) -> gripper::link::Counters {
-        gripper::link::Counters {
+    fn counters(&self) -> host::gripper::link::Counters {
+        host::gripper::link::Counters {
             writes: self.writes,
             ..Default::default()
         }
@@ -119,7 +119,7 @@ impl<F: FnMut(u64, u8) -> u8> Bench<1> for Scripted<F> {
     fn speed(&self) -> Speed {
         Speed::TWO_FINGER_85
     }
-    fn lateness(&self) -> Option<gripper::Duration> {
+    fn lateness(&self) -> Option<host::gripper::Duration> {
         None
     }
     fn line_error(&mut self) -> Option<tcp::Error> {

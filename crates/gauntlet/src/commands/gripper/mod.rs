@@ -17,8 +17,8 @@ mod table;
 mod task;
 
 use anyhow::Result;
-use gripper::driver::{ThreeFinger, TwoFinger};
-use gripper::{Activation, Fault, Status};
+use host::gripper::driver::{ThreeFinger, TwoFinger};
+use host::gripper::{Activation, Fault, Status};
 
 use crate::tell::Tell;
 use host::failure::Failure;
@@ -58,7 +58,7 @@ fn first_status<B: Bench<X>, const X: usize>(
     waiter: &Waiter,
     driver: &mut B,
     target: &Target,
-    config: gripper::driver::Config,
+    config: host::gripper::driver::Config,
 ) -> Result<Status<X>> {
     driver.identify();
     let patience = target.settings().patience();
@@ -72,7 +72,7 @@ fn first_status<B: Bench<X>, const X: usize>(
 
 fn act<B: Bench<X>, const X: usize>(
     mut driver: B,
-    config: gripper::driver::Config,
+    config: host::gripper::driver::Config,
     options: &Gripper,
     interrupt: &Interrupt,
 ) -> Result<()> {

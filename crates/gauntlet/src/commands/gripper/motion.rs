@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use anyhow::Result;
-use gripper::{Activation, Fault, Status, space};
+use host::gripper::{Activation, Fault, Status, space};
 
 use super::allowed::may_move;
 use super::args::Move;

@@ -2,18 +2,18 @@
 
 use super::*;
 use crate::commands::gripper::axes::next_command;
-use gripper::{Activation, Contact};
+use host::gripper::{Activation, Contact};
 
 fn status<const X: usize>(position: [u8; X]) -> Status<X> {
     Status {
-        stamp: gripper::Instant::from_ticks(0),
+        stamp: host::gripper::Instant::from_ticks(0),
         activation: Activation::Ready,
         going_to: true,
         contact: [Contact::AtPosition; X],
         echo: position,
         position,
         current: [0; X],
-        fault: gripper::Fault::None,
+        fault: host::gripper::Fault::None,
     }
 }
 

@@ -3,7 +3,7 @@
 
 use std::collections::VecDeque;
 
-use gripper::{Contact, Duration, Instant, Status};
+use host::gripper::{Contact, Duration, Instant, Status};
 
 use host::clock::since;
 

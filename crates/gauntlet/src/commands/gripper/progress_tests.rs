@@ -1,7 +1,7 @@
 //! A gripper that says one thing and does another, status after status.
 
 use super::*;
-use gripper::{Activation, Fault};
+use host::gripper::{Activation, Fault};
 
 /// What one axis says and does 8 ms at a time: its position and contact by time (ms).
 fn ended(target: u8, says: impl Fn(u64) -> (u8, Contact, bool)) -> (Option<Judgement<1>>, u64) {

@@ -2,7 +2,7 @@
 //! at a limit, or its position has frozen, or is of another scale, while it went on. So it is told to go a step back and has
 //! to be seen to go there.
 
-use gripper::{Duration, Instant, Status};
+use host::gripper::{Duration, Instant, Status};
 
 use super::progress::{NEAR, Rest, STANDS, STUCK, is_at_stop};
 use host::clock::since;

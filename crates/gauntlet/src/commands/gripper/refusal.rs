@@ -1,6 +1,6 @@
 //! Why a move does not go on, in words, with the next step.
 
-use gripper::{Instant, Status};
+use host::gripper::{Instant, Status};
 
 use super::leader::Leader;
 use host::clock::since;

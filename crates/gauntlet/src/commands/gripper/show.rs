@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use gripper::travel::{DOUBTS, Plausibility, Verdict};
-use gripper::{Activation, Fault, Status};
+use host::gripper::travel::{DOUBTS, Plausibility, Verdict};
+use host::gripper::{Activation, Fault, Status};
 
 use super::bench::Bench;
 use super::doing::{Doing, is_refusing};

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use gripper::registers::Kind;
+use host::gripper::registers::Kind;
 
 use super::args::Target;
 use super::bench::Bench;
@@ -14,12 +14,12 @@ use host::next::{Command, advice};
 pub(super) fn no_answer<B: Bench<X>, const X: usize>(
     target: &Target,
     driver: &mut B,
-    config: gripper::driver::Config,
-    last: Option<gripper::Error>,
+    config: host::gripper::driver::Config,
+    last: Option<host::gripper::Error>,
 ) -> anyhow::Error {
     let place = target.gripper.display();
     let (name, _) = driver.names();
-    if let Some(gripper::Error::OtherGripper(kind)) = last {
+    if let Some(host::gripper::Error::OtherGripper(kind)) = last {
         return Failure::new(
             format!(
                 "a {} answers on {place}, not a {name}: nothing was written to it",
@@ -62,7 +62,7 @@ pub(super) fn no_answer<B: Bench<X>, const X: usize>(
         )
         .into();
     }
-    if let Some(gripper::Error::Link(error @ gripper::link::Error::Shifted(_))) = last {
+    if let Some(host::gripper::Error::Link(error @ host::gripper::link::Error::Shifted(_))) = last {
         return Failure::new(
             format!(
                 "no {name} answers on {place} as unit {}: {error}",
@@ -76,7 +76,9 @@ pub(super) fn no_answer<B: Bench<X>, const X: usize>(
     let why = last.map_or_else(String::new, |error| format!(": {error}"));
     let refused = matches!(
         last,
-        Some(gripper::Error::Link(gripper::link::Error::Exception(_)))
+        Some(host::gripper::Error::Link(
+            host::gripper::link::Error::Exception(_)
+        ))
     );
     if refused && target.model == Model::ThreeFinger {
         return Failure::new(

@@ -1,6 +1,6 @@
 //! A status as a person reads it, and as JSON.
 
-use gripper::{Contact, Fault, Status};
+use host::gripper::{Contact, Fault, Status};
 
 use super::args::Target;
 use super::bench::Bench;

@@ -4,8 +4,8 @@ use std::ops::ControlFlow;
 use std::time::Duration;
 
 use anyhow::Result;
-use gripper::driver::{Failure as Why, Outcome, Task};
-use gripper::{Activation, Instant};
+use host::gripper::driver::{Failure as Why, Outcome, Task};
+use host::gripper::{Activation, Instant};
 
 use super::args::Target;
 use super::bench::{Bench, Waiter};
@@ -18,7 +18,7 @@ const TASK_WAIT: Duration = Duration::from_secs(65);
 /// Without an answer for this long the gripper has fallen silent: it is not just slow.
 const SILENCE: Duration = Duration::from_secs(2);
 /// Nobody looked for this long: the process stood still, and heard nothing for that reason.
-const STALL: gripper::Duration = gripper::Duration::from_millis(250);
+const STALL: host::gripper::Duration = host::gripper::Duration::from_millis(250);
 
 /// How the wait ended.
 enum End {
@@ -69,7 +69,7 @@ struct Silence {
     stale: u32,
     heard: Instant,
     looked: Instant,
-    limit: gripper::Duration,
+    limit: host::gripper::Duration,
 }
 
 impl Silence {
@@ -141,7 +141,12 @@ fn silent<B: Bench<X>, const X: usize>(
     .into()
 }
 
-fn failed(task: Task, why: Why, last: Option<gripper::Error>, target: &Target) -> anyhow::Error {
+fn failed(
+    task: Task,
+    why: Why,
+    last: Option<host::gripper::Error>,
+    target: &Target,
+) -> anyhow::Error {
     match why {
         Why::Fault(fault) => Failure::new(
             format!(
@@ -168,7 +173,7 @@ fn failed(task: Task, why: Why, last: Option<gripper::Error>, target: &Target) -
         ),
         Why::Deadline => {
             let last = match last {
-                Some(gripper::Error::Link(error)) => format!("; last on the line: {error}"),
+                Some(host::gripper::Error::Link(error)) => format!("; last on the line: {error}"),
                 _ => String::new(),
             };
             Failure::new(

@@ -3,7 +3,7 @@
 use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
-use glove::hand::{JOINT_COUNT, Side};
+use host::glove::hand::{JOINT_COUNT, Side};
 
 use crate::out;
 use crate::progress::Progress;
@@ -46,7 +46,7 @@ pub(super) struct Session {
     hand: Hand,
     rows: SyncSender<Row>,
     quiet: bool,
-    first: Option<glove::Instant>,
+    first: Option<host::glove::Instant>,
     written: u64,
     passed_over: u64,
     movements: Movements,

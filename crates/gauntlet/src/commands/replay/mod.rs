@@ -7,7 +7,7 @@ mod watched;
 use std::time::Instant;
 
 use anyhow::Result;
-use bridge::{App, Board};
+use host::bridge::{App, Board};
 
 use crate::progress::{Person, Progress};
 use crate::results::{self, replays};

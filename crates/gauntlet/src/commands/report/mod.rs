@@ -9,17 +9,17 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use trainer::data::{Columns, Pairs, Table};
-use trainer::hand::{Draw, Space};
-use trainer::model::Model;
-use trainer::whole_file;
+use host::trainer::data::{Columns, Pairs, Table};
+use host::trainer::hand::{Draw, Space};
+use host::trainer::model::Model;
+use host::trainer::whole_file;
 
 use crate::outputs::{self, Kind};
 use crate::progress::Person;
 use crate::results::{self, maps};
 use crate::tell::Tell;
-use glove::hand::JOINT_NAMES;
 use host::failure::{Failure, OrFail, told};
+use host::glove::hand::JOINT_NAMES;
 use host::next::{Command, NextStep};
 use host::teaching::kept::Kept;
 use host::training::judgement::Judgement;

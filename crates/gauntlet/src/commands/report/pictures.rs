@@ -1,14 +1,14 @@
 //! The page's drawings.
 
 use charts::{Chart, Curve, Drawing, Error, Panel, charts, panels};
-use glove::hand::{JOINT_COUNT, JOINT_NAMES};
+use host::glove::hand::{JOINT_COUNT, JOINT_NAMES};
+use host::trainer::data::Matrix;
+use host::trainer::hand::Space;
+use host::trainer::measures::{NEIGHBOURS, dissimilarities};
+use host::trainer::spread::spread;
 use paper::figure::{Shown as Domain, principal};
 use paper::hands::{Motion as Strip, chosen_pairs};
 use rig::PoseSource;
-use trainer::data::Matrix;
-use trainer::hand::Space;
-use trainer::measures::{NEIGHBOURS, dissimilarities};
-use trainer::spread::spread;
 
 use super::shown::Shown;
 use crate::played;

@@ -2,9 +2,9 @@
 
 use std::path::Path;
 
-use trainer::data::{Matrix, Pairs};
-use trainer::hand::Space;
-use trainer::model::Model;
+use host::trainer::data::{Matrix, Pairs};
+use host::trainer::hand::Space;
+use host::trainer::model::Model;
 
 use host::training::judgement::Judgement;
 use host::training::motion::Motion;

@@ -4,11 +4,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
+use host::trainer::algorithm;
+use host::trainer::network::Initialisation;
+use host::trainer::optimizer::LearningRate;
 use paper::Source;
 use paper::plan::{Frame, What};
-use trainer::algorithm;
-use trainer::network::Initialisation;
-use trainer::optimizer::LearningRate;
 
 use crate::commands::train::{Schedule, deviation};
 

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use charts::{Drawing, charts, panels};
-use glove::hand::JOINT_NAMES;
+use host::glove::hand::JOINT_NAMES;
 use paper::plan::What;
 use paper::shapes::{self, ShapePair};
 use paper::{Cell, Kept, figure, fold, hands};

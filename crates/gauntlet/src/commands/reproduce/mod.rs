@@ -8,7 +8,7 @@ mod work;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use glove::hand::LIMITS;
+use host::glove::hand::LIMITS;
 use paper::plan::{Frame, What};
 use paper::{Laboratory, Store};
 

@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use anyhow::Result;
+use host::trainer::whole_file;
 use paper::plan::What;
 use paper::shapes::ShapePair;
 use paper::{Cell, Kept, Source, Table, text};
-use trainer::whole_file;
 
 use super::Bench;
 use crate::results::paper::{Data, Made, Numbers};

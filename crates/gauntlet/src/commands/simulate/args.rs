@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use clap::Args;
-use glove::hand::Side;
+use host::glove::hand::Side;
 
 use crate::options::model_parser;
 use crate::wearer::Wearer;

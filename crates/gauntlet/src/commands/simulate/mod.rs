@@ -8,8 +8,8 @@ use std::io::IsTerminal;
 use std::time::{Duration, SystemTime};
 
 use anyhow::Result;
-use glove::calibration::{Bound, Profile};
-use glove::hand::Side;
+use host::glove::calibration::{Bound, Profile};
+use host::glove::hand::Side;
 use rig::glove::VirtualGlove;
 
 pub use args::Simulate;

@@ -4,9 +4,9 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::Result;
-use glove::hand::SEGMENT_COUNT;
-use glove::scan::Health;
-use gripper::Activation;
+use host::glove::hand::SEGMENT_COUNT;
+use host::glove::scan::Health;
+use host::gripper::Activation;
 
 use super::args::Teleop;
 use crate::commands::glove::speed;

@@ -6,7 +6,7 @@ mod bringup;
 use std::path::Path;
 
 use anyhow::Result;
-use glove::hand::Side;
+use host::glove::hand::Side;
 
 use crate::commands::glove::speed;
 use crate::options::OnOff;

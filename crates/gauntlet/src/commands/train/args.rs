@@ -9,9 +9,9 @@ use host::training::PairChoice;
 use crate::commands::teleop::Hand as WhichHand;
 use crate::options::{ReadingOptions, model_parser};
 use host::chip::link::Address;
-use trainer::cost::Cost;
-use trainer::measures::Coverage;
-use trainer::network::Initialisation;
+use host::trainer::cost::Cost;
+use host::trainer::measures::Coverage;
+use host::trainer::network::Initialisation;
 
 /// Options of `train`.
 #[derive(Debug, Args)]
@@ -211,7 +211,7 @@ pub enum Schedule {
     Paper,
 }
 
-impl From<Schedule> for trainer::algorithm::Schedule {
+impl From<Schedule> for host::trainer::algorithm::Schedule {
     fn from(word: Schedule) -> Self {
         match word {
             Schedule::Fast => Self::Fast,
@@ -222,7 +222,7 @@ impl From<Schedule> for trainer::algorithm::Schedule {
 
 fn cost(text: &str) -> Result<Cost, String> {
     text.parse()
-        .map_err(|error: trainer::cost::UnknownCost| error.to_string())
+        .map_err(|error: host::trainer::cost::UnknownCost| error.to_string())
 }
 
 fn number(text: &str, allowed: impl Fn(f64) -> bool, what: &str) -> Result<f64, String> {

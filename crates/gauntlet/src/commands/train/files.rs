@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use trainer::model::Model;
+use host::trainer::model::Model;
 
 use super::args::Train;
 use crate::outputs::{self, Kind};

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use anyhow::Result;
-use trainer::hand::Space;
+use host::trainer::hand::Space;
 
 use super::args::Train;
 use crate::progress::Person;

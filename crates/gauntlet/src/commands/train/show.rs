@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::Result;
-use trainer::algorithm::starts::Start;
-use trainer::hand::table3::POSES;
+use host::trainer::algorithm::starts::Start;
+use host::trainer::hand::table3::POSES;
 
 use super::args::Train;
 use crate::results::{self, maps};

@@ -69,7 +69,7 @@ fn killed_at_moments(count: u64, seed: u64) {
     let mut body = Bare::new(&wearer);
     lived.free_motion(&mut body, &bench.kept).unwrap();
     let (mut whole, _) = lived.lessons(&bench.kept).unwrap();
-    let mut random = trainer::random::Random::new(seed, 5);
+    let mut random = host::trainer::random::Random::new(seed, 5);
     for moment in 0..count {
         let at = 2.0 + 40.0 * random.unit_f64();
         let _ = std::fs::remove_file(&bench.kept.pairs);

@@ -3,8 +3,8 @@
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use glove::calibration::Step;
-use glove::hand::{JOINT_COUNT, Side};
+use host::glove::calibration::Step;
+use host::glove::hand::{JOINT_COUNT, Side};
 
 use crate::commands::calibrate::source::{Place, Source};
 use crate::commands::teleop::Hand as WhichHand;
@@ -75,7 +75,7 @@ impl<'a> Worn<'a> {
     }
 
     /// The time on the clock of the scans.
-    pub fn now(&self) -> glove::Instant {
+    pub fn now(&self) -> host::glove::Instant {
         self.source.now()
     }
 

@@ -9,8 +9,8 @@ mod shower;
 use std::time::Instant;
 
 use anyhow::Result;
-use trainer::data::read_samples;
-use trainer::hand::Space;
+use host::trainer::data::read_samples;
+use host::trainer::hand::Space;
 
 use super::args::Train;
 use super::request;

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
-use trainer::model::Model;
+use host::trainer::model::Model;
 
 use super::files::Files;
 use super::hand::Worn;
