@@ -5,7 +5,9 @@ use crate::setup::{self, Leave};
 use crate::skips::{Kind, Skips};
 use crate::step::{self, Failure, cargo};
 use crate::{firmware, thumb};
+use std::fs::File;
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Instant;
 
 /// How much of the test chore to run.
@@ -51,7 +53,8 @@ const OUTSIDE: [&str; 5] = [
     "fuzz",
 ];
 
-/// Format, clippy, documentation, the microcontroller's builds, and all tests; then what was left out, whatever the outcome.
+/// Format, the microcontroller's builds, all tests and beside them clippy and documentation; then what was left out, whatever
+/// the outcome.
 pub fn run(options: Options) -> Result<(), Failure> {
     let started = Instant::now();
     let mut skips = Skips::begin()?;
@@ -68,11 +71,8 @@ pub fn run(options: Options) -> Result<(), Failure> {
 fn all(Options { scope, leave }: Options, skips: &mut Skips) -> Result<(), Failure> {
     setup::for_tests(leave, scope)?;
     format()?;
-    let clippy = ["clippy", "--workspace", "--all-targets", "--locked"];
-    step::run("clippy", cargo(&clippy).args(["--", "-D", "warnings"]))?;
-    docs()?;
     let firmware = match scope {
-        Scope::Everything => Some(on_chip(skips)?),
+        Scope::Everything => Some(on_chip()?),
         Scope::HostOnly => {
             skips.add(
                 Kind::Chip,
@@ -82,7 +82,26 @@ fn all(Options { scope, leave }: Options, skips: &mut Skips) -> Result<(), Failu
             None
         }
     };
-    tests(firmware.as_deref(), skips)?;
+    let with_chip = firmware.is_some() && thumb::is_installed();
+    if firmware.is_some() && !with_chip {
+        let why = "Debian's compiler brings none";
+        skips.add(Kind::Chip, "clippy of the firmware", why)?;
+    }
+    let nextest = step::succeeds(&mut cargo(&["nextest", "--version"]));
+    if nextest {
+        let binaries = built()?;
+        // Most tests wait most of the time: what only computes fits beside them.
+        std::thread::scope(|scope| {
+            let read = scope.spawn(|| read_through(with_chip));
+            let tests = tests(firmware.as_deref(), &binaries, skips);
+            tests.and(read.join().unwrap_or_else(|_| Err("the lints".into())))
+        })?;
+    } else {
+        println!("no cargo-nextest (cargo install cargo-nextest --locked): tests by cargo test");
+        read_through(with_chip)?;
+        let all = ["test", "--workspace", "--locked"];
+        step::run("tests", &mut prepared(&all, firmware.as_deref(), skips))?;
+    }
     if let Some(elf) = &firmware {
         println!("==> instruction counts on the emulated chip");
         let started = Instant::now();
@@ -90,6 +109,24 @@ fn all(Options { scope, leave }: Options, skips: &mut Skips) -> Result<(), Failu
         println!("<== counts: {:.1} s", started.elapsed().as_secs_f64());
     }
     Ok(())
+}
+
+/// The lints and the documentation, also of the firmware where `with_chip`, in the time that nothing else wants.
+fn read_through(with_chip: bool) -> Result<(), Failure> {
+    let clippy = ["clippy", "--workspace", "--all-targets", "--locked"];
+    step::beside("clippy", cargo(&clippy).args(["--", "-D", "warnings"]))?;
+    step::beside("docs", &mut docs_command())?;
+    if !with_chip {
+        return Ok(());
+    }
+    let root = step::workspace_root();
+    step::beside(
+        "clippy of the firmware",
+        cargo(&["clippy", "--release", "--locked", "--target", thumb::TARGET])
+            .args(["--", "-D", "warnings"])
+            .current_dir(root.join("firmware-sim"))
+            .env("CARGO_TARGET_DIR", root.join("target/firmware")),
+    )
 }
 
 fn format() -> Result<(), Failure> {
@@ -104,67 +141,64 @@ fn format() -> Result<(), Failure> {
     Ok(())
 }
 
-/// The device crates and the firmware, built and clippy-clean; the firmware's ELF file.
-fn on_chip(skips: &mut Skips) -> Result<PathBuf, Failure> {
+/// The device crates and the firmware, built and held against what is promised of them; the firmware's ELF file.
+fn on_chip() -> Result<PathBuf, Failure> {
     let elf = firmware::build()?;
     firmware::inspect(&elf, Mode::Check)?;
-    if !thumb::is_installed() {
-        skips.add(
-            Kind::Chip,
-            "clippy of the firmware",
-            "Debian's compiler brings none",
-        )?;
-        return Ok(elf);
-    }
-    let root = step::workspace_root();
-    step::run(
-        "clippy of the firmware",
-        cargo(&["clippy", "--release", "--locked", "--target", thumb::TARGET])
-            .args(["--", "-D", "warnings"])
-            .current_dir(root.join("firmware-sim"))
-            .env("CARGO_TARGET_DIR", root.join("target/firmware")),
-    )?;
     Ok(elf)
 }
 
-/// All tests, by nextest where it is there; those in QEMU run when there is a firmware, else they say that they skip.
-///
-/// nextest gives each test a process and runs those that need the machine for themselves alone (`.config/nextest.toml`).
-/// Plain cargo runs one test file after another; within one, the tests in QEMU wait for one another.
-fn tests(firmware: Option<&Path>, skips: &Skips) -> Result<(), Failure> {
-    let prepared = |arguments: &[&str]| {
-        let mut command = cargo(arguments);
-        match firmware {
-            Some(elf) => command.env("GAUNTLET_FIRMWARE", elf),
-            None => command.env_remove("GAUNTLET_FIRMWARE"),
-        };
-        skips.collect(&mut command);
-        setup::name_peers(&mut command);
-        command
+/// A test command; those in QEMU run when there is a firmware, else they say that they skip.
+fn prepared(arguments: &[&str], firmware: Option<&Path>, skips: &Skips) -> Command {
+    let mut command = cargo(arguments);
+    match firmware {
+        Some(elf) => command.env("GAUNTLET_FIRMWARE", elf),
+        None => command.env_remove("GAUNTLET_FIRMWARE"),
     };
-    if !step::succeeds(&mut cargo(&["nextest", "--version"])) {
-        println!("no cargo-nextest (cargo install cargo-nextest --locked): tests by cargo test");
-        return step::run("tests", &mut prepared(&["test", "--workspace", "--locked"]));
-    }
+    skips.collect(&mut command);
+    setup::name_peers(&mut command);
+    command
+}
+
+/// Builds the tests; the file that lists their programs. With it nextest asks cargo for nothing, whose lock the lints have.
+fn built() -> Result<PathBuf, Failure> {
+    let list = step::workspace_root().join("target/nextest-binaries.json");
+    let file = File::create(&list).map_err(|error| format!("{}: {error}", list.display()))?;
     step::run(
         "tests: build",
-        &mut cargo(&["nextest", "run", "--workspace", "--locked", "--no-run"]),
+        cargo(&["nextest", "list", "--workspace", "--locked"])
+            .args(["--list-type", "binaries-only", "--message-format", "json"])
+            .stdout(file),
     )?;
+    Ok(list)
+}
+
+/// All tests, by nextest: each in a process, those that need the machine for themselves alone (`.config/nextest.toml`).
+fn tests(firmware: Option<&Path>, binaries: &Path, skips: &Skips) -> Result<(), Failure> {
     step::run(
         "tests",
-        &mut prepared(&["nextest", "run", "--workspace", "--locked"]),
+        prepared(&["nextest", "run", "--workspace"], firmware, skips)
+            .arg("--binaries-metadata")
+            .arg(binaries),
     )?;
     // nextest runs no examples of the documentation.
     step::run(
         "tests of the documentation",
-        &mut prepared(&["test", "--doc", "--workspace", "--locked"]),
+        &mut prepared(
+            &["test", "--doc", "--workspace", "--locked"],
+            firmware,
+            skips,
+        ),
     )
 }
 
 /// The documentation of every crate of the workspace; a warning is an error.
 pub fn docs() -> Result<(), Failure> {
-    step::run(
-        "docs",
-        cargo(&["doc", "--workspace", "--no-deps", "--locked"]).env("RUSTDOCFLAGS", "-D warnings"),
-    )
+    step::run("docs", &mut docs_command())
+}
+
+fn docs_command() -> Command {
+    let mut command = cargo(&["doc", "--workspace", "--no-deps", "--locked"]);
+    command.env("RUSTDOCFLAGS", "-D warnings");
+    command
 }

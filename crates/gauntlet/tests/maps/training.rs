@@ -324,3 +324,45 @@ fn tables_of_other_programs_train_and_what_was_done_is_said() {
     assert!(noted.contains("above the header"), "{noted}");
     assert!(model == std::fs::read(&out).unwrap(), "another model");
 }
+
+/// The most memory a process took until it ended, MB; how it ended.
+fn most_memory(mut child: std::process::Child) -> (f64, std::process::ExitStatus) {
+    let place = format!("/proc/{}/status", child.id());
+    let end = Instant::now() + Duration::from_secs(120);
+    let mut most = 0.0_f64;
+    loop {
+        let kilobytes = std::fs::read_to_string(&place).ok().and_then(|status| {
+            let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+            line.split_whitespace().next()?.parse::<f64>().ok()
+        });
+        most = most.max(kilobytes.unwrap_or(0.0) / 1024.0);
+        if let Some(status) = child.try_wait().unwrap() {
+            return (most, status);
+        }
+        if Instant::now() > end {
+            child.kill().unwrap();
+            panic!("still running at {most:.0} MB");
+        }
+        std::thread::sleep(Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn sixteen_thousand_frames_are_measured_and_trained_in_less_than_400_megabytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 16_000);
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    let short = [
+        "train", "--poses", poses, "--out", out, "--pairs", "2", "--epochs", "6", "--starts", "1",
+    ];
+    let given = model().to_str().unwrap();
+    let measured = ["eval", "--model", given, "--poses", poses];
+    for words in [&measured[..], &short[..]] {
+        let mut child = command(words);
+        let child = child.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+        let (most, status) = most_memory(child.unwrap());
+        assert!(status.success(), "{}: {status}", words[0]);
+        assert!((1.0..400.0).contains(&most), "{}: {most:.0} MB", words[0]);
+    }
+}

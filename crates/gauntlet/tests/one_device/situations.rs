@@ -10,6 +10,9 @@
 //! | an adapter that is pulled out | `ends_judged`: `a_run_that_ends_without_its_glove_has_failed`; `devices`: `a_hold_that_the_gripper_does_not_confirm_…` |
 //! | a process that stands still in a move | `gripper_doubted`: `a_process_that_stood_still_asks_where_the_gripper_is_before_it_commands` |
 //! | a disk that is full under the log | `ends_judged`: `a_log_that_can_grow_no_more_is_told_while_the_run_goes_on_and_stays_readable` |
+//! | a joint at rest, a column that never changes | `training`: `a_joint_that_rests_is_warned_of_by_its_name`; `domains_refused`: `a_constant_column_is_named_and_trains_only_when_forced` |
+//! | a recording of 16,000 frames | `training`: `sixteen_thousand_frames_are_measured_and_trained_in_less_than_400_megabytes` |
+//! | the same motion at 120 Hz | `host::training::quality`: `the_same_motion_sampled_more_often_has_the_same_measures` |
 //! | models that are none, are cut short or have a flipped bit; tables as other programs write them; outputs that cannot be written | `wrong_files`, `domains`, `domains_refused`, `training`, `export` |
 
 use crate::support;
