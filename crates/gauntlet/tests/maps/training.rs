@@ -332,7 +332,9 @@ fn most_memory(mut child: std::process::Child) -> (f64, std::process::ExitStatus
     let mut most = 0.0_f64;
     loop {
         let kilobytes = std::fs::read_to_string(&place).ok().and_then(|status| {
-            let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+            let line = status
+                .lines()
+                .find_map(|line| line.strip_prefix("VmHWM:"))?;
             line.split_whitespace().next()?.parse::<f64>().ok()
         });
         most = most.max(kilobytes.unwrap_or(0.0) / 1024.0);

@@ -231,6 +231,10 @@ impl Worker {
                 let answer = self.link.engage();
                 // Also where the answer is lost: the bridge may have closed it.
                 self.touched |= !matches!(answer, Err(Error::Refused(_)));
+                if let Err(Error::Silent { .. }) = answer {
+                    self.orders.came_too_late();
+                    return self.obey(Order::Release);
+                }
                 let (epoch, status) = answer?;
                 (self.epoch, self.status) = (Some(epoch), status);
                 (self.clutch, self.missed) = (Position::Closed, 0);

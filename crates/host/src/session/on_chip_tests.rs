@@ -233,6 +233,26 @@ fn a_clutch_is_closed_although_the_reply_to_a_question_before_was_lost() {
 }
 
 #[test]
+fn an_order_to_close_the_clutch_that_does_not_arrive_at_once_closes_nothing_later() {
+    let bridge = Scripted::start();
+    let session = watching(&bridge);
+    bridge.script().unheard = Some("Engage");
+    let given = Instant::now();
+    assert!(session.order(Order::Engage));
+    until(&session, |_| session.orders().too_late() == 1);
+    bridge.script().unheard = None;
+    // Longer than any repetition would be waited for.
+    until(&session, |seen| {
+        assert_eq!(seen.clutch, Position::Open);
+        given.elapsed() > Duration::from_secs(2)
+    });
+    assert_eq!(bridge.script().calls.last().unwrap(), "Release");
+    assert!(!bridge.script().calls.contains(&"Engage".to_owned()));
+    assert!(session.order(Order::Engage));
+    until(&session, |seen| seen.clutch == Position::Closed);
+}
+
+#[test]
 fn an_activation_that_was_asked_for_goes_on_until_the_gripper_says_that_it_is_ready() {
     use gripper::Activation::{Activating, Ready, Reset};
     let left = |asked: bool, commands: u32, says: Option<gripper::Activation>| {

@@ -108,7 +108,8 @@ impl Orders {
         *place = Some(profile);
     }
 
-    /// Orders to close the clutch or to activate that were passed over so far, since they were too old when they came.
+    /// Orders to close the clutch or to activate that were passed over so far, since they were too old when they came, or that no
+    /// bridge answered.
     pub fn too_late(&self) -> u32 {
         self.too_late.load(Ordering::Relaxed)
     }
@@ -141,10 +142,15 @@ impl Queue {
                 return Some(order);
             }
             if old && order.is_act() {
-                self.too_late.fetch_add(1, Ordering::Relaxed);
+                self.came_too_late();
             }
         }
         ends.then_some(Order::Stop)
+    }
+
+    /// An act did not reach the bridge while it was new.
+    pub fn came_too_late(&self) {
+        self.too_late.fetch_add(1, Ordering::Relaxed);
     }
 }
 

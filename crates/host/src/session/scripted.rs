@@ -45,6 +45,8 @@ pub struct Script {
     pub refused: Option<(&'static str, Refusal)>,
     /// Call whose next reply is lost on the way, by name.
     pub lost: Option<&'static str>,
+    /// Call that never arrives, by name.
+    pub unheard: Option<&'static str>,
     /// Samples to be sent.
     pub samples: VecDeque<Sample>,
     /// Whether a sample goes out every 50 ms by itself.
@@ -248,6 +250,7 @@ impl Scripted {
             },
             refused: None,
             lost: None,
+            unheard: None,
             samples: VecDeque::new(),
             samples_flow: true,
             cut: false,
@@ -318,8 +321,14 @@ fn replies(bytes: &[u8], decoder: &mut Decoder, script: &Mutex<Script>) -> Vec<F
     let reply = |message: &[u8]| {
         let request: Request<'_> = postcard::from_bytes(message).unwrap();
         let mut script = script.lock().unwrap();
-        let answer = script.answer(&request.call);
         let name = format!("{:?}", request.call);
+        if script
+            .unheard
+            .is_some_and(|unheard| name.starts_with(unheard))
+        {
+            return None;
+        }
+        let answer = script.answer(&request.call);
         let lost = script.lost.take_if(|lost| name.starts_with(*lost));
         lost.is_none().then_some(FromBridge::Reply(Reply {
             session: request.session,

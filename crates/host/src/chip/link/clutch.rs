@@ -27,7 +27,8 @@ pub enum Heartbeat {
 }
 
 impl HostLink {
-    /// Closes the clutch, an act of a person: the epoch that its heartbeats carry, and what the bridge is doing.
+    /// Closes the clutch, an act of a person: the epoch that its heartbeats carry, and what the bridge is doing. Sent for
+    /// 160 ms at most.
     ///
     /// # Errors
     /// As [`HostLink::call`], and [`Error::Older`] where the bridge speaks version 2: there a heartbeat closes the clutch.
@@ -45,7 +46,7 @@ impl HostLink {
     /// # Errors
     /// The line's fault, or another refusal than of a heartbeat.
     pub fn heartbeat(&mut self, epoch: Epoch) -> Result<Heartbeat, Error> {
-        match self.ask(&Call::Heartbeat { epoch }, HEARTBEAT_WAIT, 1) {
+        match self.ask(&Call::Heartbeat { epoch }, &[HEARTBEAT_WAIT]) {
             Ok(Answer::Status(status)) => Ok(Heartbeat::Kept(status)),
             Ok(other) => Err(confused(&other)),
             Err(Error::Silent { .. }) => Ok(Heartbeat::Unanswered),
@@ -124,7 +125,7 @@ impl HostLink {
         if wait < LEAST_WAIT {
             return Ok(None);
         }
-        match self.ask(call, wait, 1) {
+        match self.ask(call, &[wait]) {
             Ok(answer) => Ok(Some(Some(answer))),
             Err(Error::Silent { .. }) => Ok(Some(None)),
             Err(error) => Err(error),

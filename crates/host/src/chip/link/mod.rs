@@ -32,6 +32,13 @@ use line::{Kept, Line};
 pub const ATTEMPTS: u32 = 5;
 /// For a reply.
 const REPLY_WAIT: Duration = Duration::from_millis(300);
+/// For the replies to what makes motion possible. The last of them is sent 160 ms after the first: an act that reaches the bridge
+/// later is no act any more. None waits in front of an order to open for longer than these together.
+const ACT_WAITS: [Duration; 3] = [
+    Duration::from_millis(80),
+    Duration::from_millis(80),
+    REPLY_WAIT,
+];
 /// For the reply to a chunk, which takes 46 ms of a line at 115200 baud. An emulator on a machine with much to do is ten times
 /// slower; chunks that were sent again too early would pile up in front of it.
 const CHUNK_WAIT: Duration = Duration::from_secs(1);
@@ -174,6 +181,8 @@ impl HostLink {
     /// The line's fault, silence after [`ATTEMPTS`], or the bridge's refusal.
     pub fn call(&mut self, call: &Call<'_>) -> Result<Answer, Error> {
         let wait = match call {
+            // Said again while the act is new.
+            Call::Engage | Call::Activate => return self.ask(call, &ACT_WAITS),
             Call::WeightsBegin { .. }
             | Call::WeightsCommit
             | Call::ProfileCommit { .. }
@@ -183,10 +192,11 @@ impl HostLink {
             Call::WeightsChunk { .. } | Call::ProfileChunk { .. } => CHUNK_WAIT,
             _ => REPLY_WAIT,
         };
-        self.ask(call, wait, ATTEMPTS)
+        self.ask(call, &[wait; ATTEMPTS as usize])
     }
 
-    fn ask(&mut self, call: &Call<'_>, wait: Duration, attempts: u32) -> Result<Answer, Error> {
+    /// Sends it once for each of `waits`, and waits that long for its reply.
+    fn ask(&mut self, call: &Call<'_>, waits: &[Duration]) -> Result<Answer, Error> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Request {
             session: self.session,
@@ -197,9 +207,11 @@ impl HostLink {
         self.heard = Heard::default();
         self.asked.clone_from(&bytes);
         let damaged_before = self.damaged();
-        for attempt in 0..attempts {
-            self.repeats += u32::from(attempt > 0);
-            let deadline = Instant::now() + wait;
+        let mut attempts = 0;
+        for wait in waits {
+            self.repeats += u32::from(attempts > 0);
+            attempts += 1;
+            let deadline = Instant::now() + *wait;
             self.send(&bytes, deadline)?;
             while let Some(reply) = self.receive(deadline)? {
                 if reply.session == self.session && reply.sequence == self.sequence {
