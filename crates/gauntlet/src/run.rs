@@ -282,7 +282,7 @@ impl Run {
                 self.obey(key, options);
             }
             let keys = live.interactive();
-            let attended = keys || self.has_pages();
+            let attended = keys || self.has_person();
             self.attended = attended;
             live.show(|| self.view(options, started.elapsed(), keys))
                 .or_fail(terminal, next)?;

@@ -165,7 +165,10 @@ fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
         error.contains("hand.csv") && error.contains("large"),
         "{error}"
     );
-    assert!(bench.file("hand.csv").exists());
+    let kept = std::fs::read_to_string(bench.file("hand.csv")).unwrap();
+    let kept: Vec<&str> = kept.lines().skip(1).collect();
+    assert_eq!(result(&output)["poses"]["rows"], kept.len(), "{said}");
+    assert!(kept.iter().all(|row| row.split(',').count() == 26));
 }
 
 #[test]

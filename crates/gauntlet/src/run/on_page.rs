@@ -6,7 +6,7 @@ use host::gripper::kinematics::Model;
 use host::gripper::registers::two_finger;
 
 use crate::live::View;
-use crate::web::{Page, Said};
+use crate::web::{Page, Said, Wish};
 use host::lines;
 
 /// So long it is told that a page acted on an old picture.
@@ -22,6 +22,8 @@ pub(super) struct OnPage {
     pub slow: Option<(Instant, View)>,
     /// A page acted on a picture that was so old, and when.
     behind: Option<(Instant, Duration)>,
+    /// Somebody asked for something there: a page that only lies open is nobody.
+    pub is_used: bool,
 }
 
 impl OnPage {
@@ -31,11 +33,13 @@ impl OnPage {
             model,
             slow: None,
             behind: None,
+            is_used: false,
         }
     }
 
     /// Looks whether who said it saw what is so.
     pub fn look(&mut self, said: &Said) {
+        self.is_used |= matches!(said.wish, Wish::Close | Wish::Open | Wish::Do(_));
         if let (true, Some(behind)) = (said.wish.moves(), said.is_behind()) {
             self.behind = Some((Instant::now(), behind));
         }

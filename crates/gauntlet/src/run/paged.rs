@@ -35,11 +35,16 @@ impl Run {
         self.page.as_ref().map(|shown| shown.page.address())
     }
 
-    /// Whether somebody looks at a page, and can close the clutch there.
-    pub(super) fn has_pages(&self) -> bool {
+    /// Whether a page is open.
+    fn has_pages(&self) -> bool {
         self.page
             .as_ref()
             .is_some_and(|shown| shown.page.watching() > 0)
+    }
+
+    /// Whether a page is open at which somebody has asked for something, and so can close the clutch.
+    pub(super) fn has_person(&self) -> bool {
+        self.has_pages() && self.page.as_ref().is_some_and(|shown| shown.is_used)
     }
 
     /// Pause between two rounds.

@@ -17,6 +17,7 @@
 //! button or a key down; heartbeats come from the page and rest on a picture that is not older than half a second.
 
 mod bodies;
+mod bounded;
 mod guard;
 mod inbox;
 pub mod picture;

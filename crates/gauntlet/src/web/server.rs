@@ -1,10 +1,8 @@
 //! The server's thread: the page's files and its WebSockets, with a bound on everything.
 
-use std::net::{SocketAddr, TcpListener};
-use std::pin::Pin;
+use std::net::TcpListener;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::task::{Context, Poll};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -16,12 +14,9 @@ use axum::http::{HeaderMap, HeaderValue, StatusCode};
 use axum::middleware::{self, Next};
 use axum::response::{IntoResponse, Response};
 use axum::routing::get;
-use axum::serve::Listener;
-use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
-use tokio::net::TcpStream;
-use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use tokio::time::{Instant, Sleep, sleep};
+use tokio::time::{Instant, sleep};
 
+use super::bounded::Bounded;
 use super::guard::{Guard, Refusal, token};
 use super::inbox::Said;
 use super::picture::{Map, Picture};
@@ -29,10 +24,6 @@ use super::shared::{Published, Shared};
 use super::socket;
 use host::clock::since_boot;
 
-/// Connections at once. More wait, in the system's queue.
-const CONNECTIONS: usize = 32;
-/// A connection on which nothing comes for so long is closed: a page asks for pictures all the time.
-const SILENT: Duration = Duration::from_secs(15);
 /// For the pages to hear that the program ends.
 const GOODBYE: Duration = Duration::from_millis(300);
 /// Largest message of a page, bytes.
@@ -119,11 +110,7 @@ impl Drop for Server {
 
 async fn serve(listener: tokio::net::TcpListener, shared: Arc<Shared>) {
     let mut over = shared.over.subscribe();
-    let bounded = Bounded {
-        listener,
-        free: Arc::new(Semaphore::new(CONNECTIONS)),
-    };
-    let served = axum::serve(bounded, router(Arc::clone(&shared)));
+    let served = axum::serve(Bounded::new(listener), router(Arc::clone(&shared)));
     tokio::select! {
         _ = served => {}
         _ = over.wait_for(|over| *over) => {}
@@ -220,84 +207,5 @@ async fn upgrade(
             .max_frame_size(MESSAGE)
             .on_upgrade(|socket| socket::serve(socket, shared)),
         Err(refusal) => refused(refusal),
-    }
-}
-
-/// A listener that lets only so many in, and none that says nothing.
-struct Bounded {
-    listener: tokio::net::TcpListener,
-    free: Arc<Semaphore>,
-}
-
-impl Listener for Bounded {
-    type Io = Bound;
-    type Addr = SocketAddr;
-
-    async fn accept(&mut self) -> (Bound, SocketAddr) {
-        // It is never closed.
-        let place = Arc::clone(&self.free).acquire_owned().await.ok();
-        let (stream, address) = Listener::accept(&mut self.listener).await;
-        // Pictures are small and each is whole; without it the system waits for more of them.
-        let _ = stream.set_nodelay(true);
-        let silent = Box::pin(sleep(SILENT));
-        let bound = Bound {
-            stream,
-            silent,
-            _place: place,
-        };
-        (bound, address)
-    }
-
-    fn local_addr(&self) -> std::io::Result<SocketAddr> {
-        self.listener.local_addr()
-    }
-}
-
-/// A connection that ends where nothing comes.
-struct Bound {
-    stream: TcpStream,
-    silent: Pin<Box<Sleep>>,
-    _place: Option<OwnedSemaphorePermit>,
-}
-
-impl AsyncRead for Bound {
-    fn poll_read(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        buffer: &mut ReadBuf<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        let read = Pin::new(&mut self.stream).poll_read(context, buffer);
-        if read.is_ready() {
-            self.silent.as_mut().reset(Instant::now() + SILENT);
-            return read;
-        }
-        self.silent
-            .as_mut()
-            .poll(context)
-            .map(|()| Err(std::io::ErrorKind::TimedOut.into()))
-    }
-}
-
-impl AsyncWrite for Bound {
-    fn poll_write(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-        bytes: &[u8],
-    ) -> Poll<std::io::Result<usize>> {
-        Pin::new(&mut self.stream).poll_write(context, bytes)
-    }
-
-    fn poll_flush(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.stream).poll_flush(context)
-    }
-
-    fn poll_shutdown(
-        mut self: Pin<&mut Self>,
-        context: &mut Context<'_>,
-    ) -> Poll<std::io::Result<()>> {
-        Pin::new(&mut self.stream).poll_shutdown(context)
     }
 }

@@ -144,17 +144,13 @@ impl ProfileStore {
             Failure::new(what, "another place for the profile, with --out FILE")
         })?;
         let path = self.path_of(&kept.bound.ids);
-        let before = path.with_extension("toml.before");
-        match std::fs::copy(&path, &before) {
-            Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
-                let what = format!(
-                    "the profile before, {}, cannot be kept: {}",
-                    path.display(),
-                    words::disk(&error)
-                );
-                return Err(Failure::new(what, "another place, with --out FILE"));
-            }
-            _ => {}
+        if let Err(error) = keep_before(&path) {
+            let what = format!(
+                "the profile before, {}, cannot be kept: {}",
+                path.display(),
+                words::disk(&error)
+            );
+            return Err(Failure::new(what, "another place, with --out FILE"));
         }
         kept.write(&path)?;
         Ok(path)
@@ -247,6 +243,21 @@ impl ProfileStore {
     }
 }
 
+/// Keeps what lies at `path` beside it, whole, with `.before` behind its name. A calibration that came out bad does not take the place of
+/// the one before it.
+fn keep_before(path: &Path) -> std::io::Result<()> {
+    let before = path.with_extension("toml.before");
+    let is_bad = |kept: Kept| kept.quality.verdict == "bad";
+    if before.exists() && Kept::read(path).is_ok_and(is_bad) {
+        return Ok(());
+    }
+    match std::fs::read(path) {
+        Ok(bytes) => trainer::whole_file::write(&before, &bytes),
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(()),
+        Err(error) => Err(error),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::super::profile_file::tests::kept;
@@ -317,6 +328,8 @@ mod tests {
         assert!(store.profile_of(&ids).unwrap().is_ok());
         let mut bad = good.clone();
         bad.quality.verdict = "bad".to_owned();
+        store.save(&bad).unwrap();
+        // And another one, no better.
         store.save(&bad).unwrap();
         let why = store.profile_of(&ids).unwrap().unwrap_err();
         assert!(why.contains("too bad to be used"), "{why}");

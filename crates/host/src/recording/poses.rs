@@ -1,7 +1,8 @@
 //! A poses file that is being written: rows of joint angles with their times, by a thread of its own.
 
+use std::fmt::Write as _;
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -51,7 +52,9 @@ impl PosesFile {
             .spawn(move || {
                 let mut count = 0;
                 let rows = given.iter().filter_map(&mut row);
-                let written = write(file, rows, &mut count).and_then(|file| file.sync_all());
+                let mut whole = Whole { file, length: 0 };
+                let written = write(&mut whole, rows, &mut count);
+                let written = written.and_then(|()| whole.file.sync_all());
                 if written.is_err() {
                     interrupt.ask();
                 }
@@ -78,23 +81,55 @@ impl PosesFile {
     }
 }
 
-fn write<W: Write>(to: W, rows: impl Iterator<Item = Row>, count: &mut u64) -> std::io::Result<W> {
-    let mut file = BufWriter::new(to);
-    write!(file, "time_s")?;
-    for name in JOINT_NAMES {
-        write!(file, ",{name}")?;
+/// What can be cut back.
+trait Cut: Write {
+    fn cut(&mut self, length: u64) -> std::io::Result<()>;
+}
+
+impl Cut for File {
+    fn cut(&mut self, length: u64) -> std::io::Result<()> {
+        self.set_len(length)
     }
-    writeln!(file)?;
-    for row in rows {
-        write!(file, "{:.6}", row.at_us as f64 / 1e6)?;
-        for angle in row.angles {
-            write!(file, ",{angle}")?;
+}
+
+/// A file of whole lines, whenever somebody looks.
+struct Whole<W> {
+    file: W,
+    length: u64,
+}
+
+impl<W: Cut> Whole<W> {
+    /// Adds `line`; where there is no room for all of it, none of it stays.
+    fn add(&mut self, line: &str) -> std::io::Result<()> {
+        if let Err(error) = self.file.write_all(line.as_bytes()) {
+            let _ = self.file.cut(self.length);
+            return Err(error);
         }
-        writeln!(file)?;
+        self.length += line.len() as u64;
+        Ok(())
+    }
+}
+
+/// A row goes to the file when it is there: whoever is killed leaves all of them.
+fn write<W: Cut>(
+    to: &mut Whole<W>,
+    rows: impl Iterator<Item = Row>,
+    count: &mut u64,
+) -> std::io::Result<()> {
+    to.add(&format!("time_s,{}\n", JOINT_NAMES.join(",")))?;
+    let mut line = String::new();
+    for row in rows {
+        line.clear();
+        // A string takes all.
+        let _ = write!(line, "{:.6}", row.at_us as f64 / 1e6);
+        for angle in row.angles {
+            let _ = write!(line, ",{angle}");
+        }
+        line.push('\n');
+        to.add(&line)?;
         *count += 1;
     }
-    file.into_inner()
-        .map_err(std::io::IntoInnerError::into_error)
+    Ok(())
 }
 
 #[cfg(test)]
@@ -140,8 +175,76 @@ mod tests {
         assert!(!path.exists());
     }
 
+    /// A disk with room for so many bytes.
+    struct Disk {
+        holds: Vec<u8>,
+        room: usize,
+    }
+
+    impl Write for Disk {
+        fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+            let taken = bytes.len().min(self.room - self.holds.len());
+            if taken == 0 {
+                return Err(std::io::ErrorKind::StorageFull.into());
+            }
+            self.holds.extend(&bytes[..taken]);
+            Ok(taken)
+        }
+
+        fn flush(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+
+    impl Cut for Disk {
+        fn cut(&mut self, length: u64) -> std::io::Result<()> {
+            self.holds.truncate(length as usize);
+            Ok(())
+        }
+    }
+
     #[test]
-    fn a_disk_that_takes_no_more_leaves_the_rows_it_took_and_names_the_file() {
+    fn a_disk_of_any_size_keeps_whole_rows_and_those_that_are_counted() {
+        let angles = [0.125; JOINT_COUNT];
+        for room in 0..1_500 {
+            let disk = Disk {
+                holds: Vec::new(),
+                room,
+            };
+            let mut to = Whole {
+                file: disk,
+                length: 0,
+            };
+            let mut count = 0;
+            let rows = (0..40).map(|at_us| Row { at_us, angles });
+            write(&mut to, rows, &mut count).expect_err("too little room");
+            let kept = String::from_utf8(to.file.holds).unwrap();
+            let rows = kept.lines().skip(1);
+            assert_eq!(rows.clone().count() as u64, count, "{room}");
+            assert!(rows.into_iter().all(|row| row.split(',').count() == 26));
+            assert!(kept.is_empty() || kept.ends_with('\n'), "{room}: {kept}");
+        }
+    }
+
+    #[test]
+    fn rows_are_in_the_file_while_others_are_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("poses.csv");
+        let never = Interrupt::never().unwrap();
+        let (poses, rows) = PosesFile::create(&path, &never, Some::<Row>).unwrap();
+        let angles = [0.5; JOINT_COUNT];
+        rows.send(Row { at_us: 7, angles }).unwrap();
+        let end = std::time::Instant::now() + std::time::Duration::from_secs(20);
+        while std::fs::read_to_string(&path).unwrap().lines().count() < 2 {
+            assert!(std::time::Instant::now() < end, "the row is kept back");
+            std::thread::sleep(std::time::Duration::from_millis(5));
+        }
+        drop(rows);
+        assert_eq!(poses.finish().0, 1);
+    }
+
+    #[test]
+    fn a_file_that_could_not_be_written_is_named_with_the_rows_it_took() {
         let full = || Err(std::io::Error::from(std::io::ErrorKind::StorageFull));
         let poses = PosesFile {
             path: "/nowhere/hand.csv".into(),

@@ -1,5 +1,6 @@
 //! The hand in the glove: opened, laid flat, moved freely.
 
+use std::path::Path;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -15,8 +16,8 @@ use crate::live::{Key, Live};
 use crate::out;
 use crate::run::{ASK_FLAT, FLAT_WAIT};
 use crate::tell::Tell;
-use host::calibration::profile_of;
 use host::calibration::virtual_person::VirtualPerson;
+use host::calibration::{may_be_ideal, profile_of};
 use host::clock::ticks;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
@@ -214,7 +215,9 @@ fn seen(free: &Free) -> String {
 
 /// How the sensors sit.
 fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand> {
+    let ids = source.ids();
     if options.worn.ideal {
+        may_be_ideal(Path::new(&place.name()), &ids)?;
         return Ok(Hand::ideal(side(options)));
     }
     let none = |why: String| {
@@ -229,7 +232,6 @@ fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand
         };
         Failure::new(what, next)
     };
-    let ids = source.ids();
     if let Source::Chip { scans, address } = source {
         let kept = scans.profile().map_err(|error| error.at(address))?;
         let bound = kept.ok_or_else(|| none("the bridge keeps no profile of it".to_owned()))?;
