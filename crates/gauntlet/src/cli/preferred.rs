@@ -9,7 +9,7 @@ use host::settings::Settings;
 type Behind = (&'static str, &'static str, &'static [&'static str]);
 
 /// The verbs that read a glove at a port.
-const GLOVES: &[&str] = &["teleop", "calibrate", "record", "glove", "doctor"];
+const GLOVES: &[&str] = &["teleop", "calibrate", "record", "glove", "doctor", "train"];
 /// The same, and that of the virtual one.
 const READ: &[&str] = &[
     "teleop",
@@ -33,7 +33,7 @@ const BEHIND: &[Behind] = &[
     (
         "hand",
         "glove.hand",
-        &["teleop", "calibrate", "record", "glove"],
+        &["teleop", "calibrate", "record", "glove", "train"],
     ),
     ("gripper", "gripper.port", GRIPPERS),
     ("gripper-model", "gripper.model", MODELS),
@@ -124,6 +124,10 @@ fn preferred(arg: &Arg, settings: &Settings, typed: Typed<'_>) -> Option<String>
     let (_, key, _) = BEHIND.iter().find(behind)?;
     let gripper = typed.names("--gripper");
     match (typed.verb, long) {
+        // A glove is worn under --live alone, and may be one of a bridge.
+        ("train", "glove" | "hand") if !typed.names("--live") || typed.names("--bridge") => {
+            return None;
+        }
         // Who names one device asks about that one alone.
         ("doctor", "glove" | "gripper") if typed.names("--glove") || gripper => return None,
         // About a named gripper's family it is asked to find out.
@@ -247,6 +251,22 @@ model = \"mine.safetensors\"
     }
 
     #[test]
+    fn a_map_is_taught_with_this_person_s_glove_and_only_then_a_port_is_meant() {
+        let glove = |line: &str| {
+            let Verb::Train(train) = parse(FILE, line).unwrap() else {
+                panic!("train");
+            };
+            train.worn.glove.clone()
+        };
+        assert_eq!(
+            glove("gauntlet train --out m --live").as_deref(),
+            Some(Path::new("/dev/g"))
+        );
+        assert_eq!(glove("gauntlet train --out m --live --bridge /dev/b"), None);
+        assert_eq!(glove("gauntlet train --out m --poses p.csv"), None);
+    }
+
+    #[test]
     fn gauntlet_alone_is_the_demo_with_this_person_s_settings() {
         let typed = whole(&["gauntlet".into()]);
         assert_eq!(typed, ["gauntlet", "demo"]);
@@ -278,9 +298,7 @@ model = \"mine.safetensors\"
             "bridge",
             "a glove at a port is meant where nothing is said",
         ),
-        ("train", "glove", "a port is opened by --live alone"),
         ("train", "bridge", "a port is opened by --live alone"),
-        ("train", "hand", "with --live alone"),
         ("report", "model", "what the page is about"),
         ("replay", "speed", "of the replay, no gripper's"),
         ("replay", "model", "what the log is held against"),
@@ -428,6 +446,8 @@ model = \"mine.safetensors\"
                 // About a family `doctor` asks where a gripper is named.
                 let line = match (*verb, *option) {
                     ("doctor", "gripper-model") => "gauntlet doctor --gripper /dev/r".to_owned(),
+                    // A port is opened by --live alone.
+                    ("train", "glove" | "hand") => "gauntlet train --live".to_owned(),
                     _ => format!("gauntlet {verb}"),
                 };
                 let settings = Settings::parse(Path::new("s.toml"), &file).unwrap();
