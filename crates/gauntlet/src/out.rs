@@ -29,7 +29,20 @@ static DROVE: AtomicBool = AtomicBool::new(false);
 /// One line to standard output. What goes wrong is kept for [`closed`] and [`check`].
 pub fn line(text: Arguments<'_>) {
     STDERR.settle(SETTLE);
-    STDOUT.push(format!("{text}\n").as_bytes());
+    STDOUT.push((harmless(text) + "\n").as_bytes());
+}
+
+/// The text with what would steer a terminal written out: a file's or a device's words may hold anything.
+fn harmless(text: Arguments<'_>) -> String {
+    let mut shown = String::new();
+    for character in text.to_string().chars() {
+        match character {
+            '\n' | '\t' => shown.push(character),
+            _ if character.is_control() => shown.extend(character.escape_default()),
+            _ => shown.push(character),
+        }
+    }
+    shown
 }
 
 /// Whether a person sits at a terminal that can be drawn on, and has keys.
@@ -118,13 +131,13 @@ fn drain(stream: &'static stream::Stream) -> bool {
 /// One line to standard error.
 pub fn note(text: Arguments<'_>) {
     STDOUT.settle(SETTLE);
-    STDERR.push(format!("{text}\n").as_bytes());
+    STDERR.push((harmless(text) + "\n").as_bytes());
 }
 
 /// A question to standard error, the cursor left behind it.
 pub fn ask(text: Arguments<'_>) {
     STDOUT.settle(SETTLE);
-    STDERR.push(text.to_string().as_bytes());
+    STDERR.push(harmless(text).as_bytes());
 }
 
 /// A picture of how something goes to standard error: dropped where the one before was not taken, and never waited for.
@@ -168,4 +181,18 @@ pub fn json(value: &impl serde::Serialize) -> anyhow::Result<()> {
     let text = serde_json::to_string_pretty(value)?;
     line(format_args!("{text}"));
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::harmless;
+
+    #[test]
+    fn what_would_steer_a_terminal_is_written_out() {
+        let foreign = "library \u{1b}]0;title\u{7}\u{1b}[2J\r\u{9b}1m, a tab\tand ß\nnext";
+        assert_eq!(
+            harmless(format_args!("{foreign}")),
+            "library \\u{1b}]0;title\\u{7}\\u{1b}[2J\\r\\u{9b}1m, a tab\tand ß\nnext"
+        );
+    }
 }

@@ -16,7 +16,7 @@ const MOST: u64 = 64 << 10;
 pub(crate) fn read(path: &Path) -> Result<Option<String>, Failure> {
     let shown = path.display();
     let wrong = |what: String, next: &str| Failure::new(format!("{shown}: {what}"), next);
-    let file = match std::fs::File::open(path) {
+    let file = match trainer::whole_file::open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == std::io::ErrorKind::NotFound => return Ok(None),
         Err(error) => return Err(wrong(error.to_string(), "a file that you may read")),

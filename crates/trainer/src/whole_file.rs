@@ -1,7 +1,12 @@
-//! Files that appear whole or not at all: written beside their place under a passing name, then renamed.
+//! Files that appear whole or not at all: written beside their place under a passing name, then renamed. And files that are read whole,
+//! from a pipe too, without waiting for ever.
 
-use std::io::Write;
+use std::fs::File;
+use std::io::{ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use rustix::fs::{Mode, OFlags};
 
 use crate::remedy::Remedy;
 
@@ -45,6 +50,63 @@ impl Remedy for Error {
             Self::Write { .. } => "check that the folder exists and that you may write there",
         };
         next.to_owned()
+    }
+}
+
+/// A pipe that says nothing for so long says nothing.
+const SILENT: Duration = Duration::from_secs(5);
+const LOOK: Duration = Duration::from_millis(5);
+
+/// A file, or a pipe, that is read from its beginning.
+#[derive(Debug)]
+pub struct Reading(File);
+
+/// Opens what lies at `path`. A pipe into which nobody writes is empty.
+///
+/// # Errors
+/// What the system says.
+pub fn open(path: &Path) -> std::io::Result<Reading> {
+    let flags = OFlags::RDONLY | OFlags::NONBLOCK | OFlags::CLOEXEC | OFlags::NOCTTY;
+    Ok(Reading(
+        rustix::fs::open(path, flags, Mode::empty())?.into(),
+    ))
+}
+
+/// Reads all of it.
+///
+/// # Errors
+/// What the system says.
+pub fn read(path: &Path) -> std::io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    open(path)?.read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
+impl Reading {
+    /// Whether it is a file, and no pipe, device or folder.
+    ///
+    /// # Errors
+    /// What the system says.
+    pub fn is_file(&self) -> std::io::Result<bool> {
+        Ok(self.0.metadata()?.is_file())
+    }
+}
+
+impl Read for Reading {
+    /// [`ErrorKind::TimedOut`] where nothing comes for five seconds.
+    fn read(&mut self, into: &mut [u8]) -> std::io::Result<usize> {
+        let end = Instant::now() + SILENT;
+        loop {
+            match self.0.read(into) {
+                Err(error) if error.kind() == ErrorKind::WouldBlock => {}
+                other => return other,
+            }
+            if Instant::now() >= end {
+                let what = format!("nothing came for {} s", SILENT.as_secs());
+                return Err(std::io::Error::new(ErrorKind::TimedOut, what));
+            }
+            std::thread::sleep(LOOK);
+        }
     }
 }
 
@@ -107,6 +169,28 @@ mod tests {
         let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().collect();
         assert_eq!(names.len(), 2);
         assert!(write(&folder.path().join("no/such/folder"), b"x").is_err());
+    }
+
+    #[test]
+    fn a_pipe_is_read_to_its_end_and_one_that_nobody_writes_to_is_not_waited_for() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("pipe");
+        let made = std::process::Command::new("mkfifo").arg(&path).status();
+        assert!(made.unwrap().success());
+        assert_eq!(read(&path).unwrap(), b"");
+        let mut reading = open(&path).unwrap();
+        assert!(!reading.is_file().unwrap());
+        let mut writer = std::fs::OpenOptions::new().write(true).open(&path).unwrap();
+        let said = std::thread::spawn(move || {
+            for piece in [&b"half"[..], b" and half"] {
+                std::thread::sleep(Duration::from_millis(30));
+                writer.write_all(piece).unwrap();
+            }
+        });
+        let mut text = String::new();
+        reading.read_to_string(&mut text).unwrap();
+        said.join().unwrap();
+        assert_eq!(text, "half and half");
     }
 
     #[test]

@@ -18,6 +18,8 @@ const ENTER: &[u8] = b"\x1b[?1049h\x1b[?2004h\x1b[2J";
 const LEAVE: &[u8] = b"\x1b[?2004l\x1b[?25h\x1b[?1049l";
 /// What a terminal has that does not say.
 const USUAL: (u16, u16) = (80, 24);
+/// The largest that is drawn on.
+const LARGEST: (u16, u16) = (640, 200);
 /// For what was drawn last to reach the terminal before another program has it.
 const SETTLE: Duration = Duration::from_millis(200);
 
@@ -94,5 +96,6 @@ pub(super) fn size() -> Rect {
         .map(|size| (size.ws_col, size.ws_row))
         .filter(|(width, height)| *width > 0 && *height > 0)
         .unwrap_or(USUAL);
-    Rect::new(0, 0, width, height)
+    // More nobody has: a wrong size would cost the memory and the time of its cells.
+    Rect::new(0, 0, width.min(LARGEST.0), height.min(LARGEST.1))
 }

@@ -63,7 +63,7 @@ pub struct Exported {
 /// Whether the file at `path` begins as a log does.
 pub fn is_log(path: &Path) -> bool {
     let mut start = [0; mcap::MAGIC.len()];
-    let read = std::fs::File::open(path)
+    let read = trainer::whole_file::open(path)
         .and_then(|mut file| std::io::Read::read_exact(&mut file, &mut start));
     read.is_ok() && start == *mcap::MAGIC
 }
@@ -74,7 +74,8 @@ pub fn is_log(path: &Path) -> bool {
 /// A failure that names it: it cannot be read, is no log, or has neither joint angles nor commands.
 pub fn read(path: &Path) -> Result<Exported> {
     let what = || format!("the session log {}", path.display());
-    let file = std::fs::read(path).or_fail(what, "a log that is there and that you may read")?;
+    let file = trainer::whole_file::read(path)
+        .or_fail(what, "a log that is there and that you may read")?;
     let mut exported = Exported::default();
     let found = salvage::read(&file, |message| exported.take(&message)).or_fail(what, record())?;
     exported.damage = found.damage;

@@ -83,7 +83,7 @@ impl Traced {
     pub fn read(path: &Path) -> Result<Self> {
         let what = || format!("{} cannot be replayed", path.display());
         let record = "the log of a gauntlet demo --log or gauntlet teleop --log";
-        let file = std::fs::read(path).or_fail(what, "a log that is there")?;
+        let file = trainer::whole_file::read(path).or_fail(what, "a log that is there")?;
         let mut blocks = Blocks::default();
         let found = salvage::read(&file, |message| {
             if message.channel.topic == TRACE_TOPIC && message.channel.encoding == TRACE_ENCODING {

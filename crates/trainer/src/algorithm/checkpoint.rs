@@ -128,7 +128,7 @@ pub(super) fn write_file(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 pub(super) fn read_file(path: &Path, starts: usize) -> Result<Vec<u8>, Error> {
     let longest = LONGEST.saturating_mul(starts as u64);
     let mut bytes = Vec::new();
-    std::fs::File::open(path)
+    crate::whole_file::open(path)
         .and_then(|file| file.take(longest).read_to_end(&mut bytes))
         .map_err(|source| Error::File {
             verb: "read",

@@ -7,7 +7,6 @@ use crate::whole_file;
 use safetensors::{Dtype, SafeTensors};
 use serde_json::{Map, Value, json};
 use sha2::{Digest, Sha256};
-use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
@@ -194,9 +193,12 @@ pub fn has_digest(bytes: &[u8]) -> bool {
 pub fn read(path: impl AsRef<Path>) -> Result<Vec<u8>, Error> {
     let path = path.as_ref();
     let mut bytes = Vec::new();
-    let read = File::open(path).and_then(|file| {
-        let is_file = file.metadata()?.is_file();
-        let most = if is_file { LONGEST_FILE } else { LONGEST };
+    let read = whole_file::open(path).and_then(|file| {
+        let most = if file.is_file()? {
+            LONGEST_FILE
+        } else {
+            LONGEST
+        };
         file.take(most).read_to_end(&mut bytes)
     });
     match read {
