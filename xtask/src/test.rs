@@ -1,21 +1,12 @@
 //! Everything that must hold before a change lands.
 
 use crate::figures::Mode;
-use crate::setup::{self, Leave};
+use crate::setup::{self, Leave, Scope};
 use crate::skips::{Kind, Skips};
 use crate::step::{self, Failure, cargo};
 use crate::{firmware, thumb};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
-
-/// How much of the test chore to run.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
-    /// All steps.
-    Everything,
-    /// Leaves out what needs the microcontroller's target.
-    HostOnly,
-}
 
 /// What the chore was told.
 #[derive(Clone, Copy, PartialEq, Eq)]
