@@ -4,7 +4,6 @@
 use crate::setup::{self, Thing};
 use crate::step::{self, Failure, cargo};
 use std::path::Path;
-use std::process::Command;
 
 /// A target, and where the tests of its crate keep its corpus.
 struct Target {
@@ -79,7 +78,7 @@ fn one(root: &Path, target: &Target, length: Length) -> Result<(), Failure> {
     let seconds = length.seconds();
     step::run(
         &format!("fuzz {} for {seconds} s", target.name),
-        nightly(&["fuzz", "run", "--fuzz-dir", "fuzz", target.name])
+        step::nightly(&["fuzz", "run", "--fuzz-dir", "fuzz", target.name])
             .arg(&grown)
             .arg(root.join(target.corpus))
             .args(["--", "-seed=1", "-len_control=0", "-print_final_stats=1"])
@@ -93,16 +92,4 @@ fn one(root: &Path, target: &Target, length: Length) -> Result<(), Failure> {
             target.name, target.corpus
         )
     })
-}
-
-/// `cargo` of the nightly toolchain, whatever toolchain runs this chore.
-pub fn nightly(arguments: &[&str]) -> Command {
-    let mut command = Command::new("rustup");
-    command
-        .args(["run", "nightly", "cargo"])
-        .args(arguments)
-        .env_remove("CARGO")
-        .env_remove("RUSTC")
-        .env_remove("RUSTUP_TOOLCHAIN");
-    command
 }

@@ -4,8 +4,7 @@
 //! other chores only where that surprises nobody, as root or with `CI` set, and otherwise say what to type.
 
 use crate::step::{self, Failure};
-use crate::test::Scope;
-use crate::{fuzz, thumb};
+use crate::thumb;
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -79,8 +78,8 @@ impl Thing {
             Self::Browser => BROWSERS
                 .iter()
                 .any(|program| step::succeeds(Command::new(program).arg("--version"))),
-            Self::Nightly => step::succeeds(&mut fuzz::nightly(&["--version"])),
-            Self::CargoFuzz => step::succeeds(&mut fuzz::nightly(&["fuzz", "--version"])),
+            Self::Nightly => step::succeeds(&mut step::nightly(&["--version"])),
+            Self::CargoFuzz => step::succeeds(&mut step::nightly(&["fuzz", "--version"])),
         }
     }
 
@@ -182,6 +181,15 @@ pub fn run() -> Result<(), Failure> {
         return Ok(());
     }
     provide(&missing, Leave::Asked)
+}
+
+/// How much of the test chore to run.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub enum Scope {
+    /// All steps.
+    Everything,
+    /// Leaves out what needs the microcontroller's target.
+    HostOnly,
 }
 
 /// What the tests use, before they run.

@@ -22,6 +22,18 @@ pub fn cargo(arguments: &[&str]) -> Command {
     command
 }
 
+/// `cargo` of the nightly toolchain, whatever toolchain runs this chore.
+pub fn nightly(arguments: &[&str]) -> Command {
+    let mut command = Command::new("rustup");
+    command
+        .args(["run", "nightly", "cargo"])
+        .args(arguments)
+        .env_remove("CARGO")
+        .env_remove("RUSTC")
+        .env_remove("RUSTUP_TOOLCHAIN");
+    command
+}
+
 /// The tool's whole-loop tests; what is added names those that run.
 pub fn whole_loop() -> Command {
     cargo(&[

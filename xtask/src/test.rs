@@ -1,7 +1,7 @@
 //! Everything that must hold before a change lands.
 
 use crate::figures::Mode;
-use crate::setup::{self, Leave};
+use crate::setup::{self, Leave, Scope};
 use crate::skips::{Kind, Skips};
 use crate::step::{self, Failure, cargo};
 use crate::{firmware, thumb};
@@ -9,15 +9,6 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
-
-/// How much of the test chore to run.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub enum Scope {
-    /// All steps.
-    Everything,
-    /// Leaves out what needs the microcontroller's target.
-    HostOnly,
-}
 
 /// What the chore was told.
 #[derive(Clone, Copy, PartialEq, Eq)]

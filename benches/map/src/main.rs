@@ -19,10 +19,8 @@ use std::hint::black_box;
 use std::path::Path;
 use std::process::ExitCode;
 
-use hae::{Kernel, Map, PackedBuffer, packed_len};
-use network::Network;
-
-const LEN: usize = packed_len(25, 300, 4);
+use hae::{Kernel, Map, PackedBuffer};
+use network::{LEN, Network};
 
 fn main() -> ExitCode {
     // candle spreads one sample over all cores otherwise, which takes longer and disturbs the others.

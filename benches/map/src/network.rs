@@ -1,9 +1,12 @@
 //! The network that everybody computes: 25 inputs, 300 hidden units, 4 outputs, one sample at a time.
 
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
+use hae::packed_len;
 
 use crate::workload::{self, Random};
 
+/// Weights that a kernel reads.
+pub const LEN: usize = packed_len(25, 300, 4);
 /// Inputs in turn, so that no branch can learn one.
 pub const INPUTS: usize = 64;
 

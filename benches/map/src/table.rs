@@ -5,8 +5,7 @@ use std::time::Instant;
 
 use hae::{Kernel, Map, PackedBuffer};
 
-use crate::LEN;
-use crate::network::{INPUTS, Network};
+use crate::network::{INPUTS, LEN, Network};
 use crate::peers::{Nalgebra, textbook};
 #[cfg(target_arch = "x86_64")]
 use crate::roof::{self, Roof};

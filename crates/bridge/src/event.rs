@@ -224,7 +224,7 @@ impl core::fmt::Display for Kind {
             Kind::AxisStands { axis } => write!(
                 f,
                 "{} of the gripper stands still although it is told to move",
-                crate::telemetry::axis_name(*axis)
+                crate::axis::name(*axis)
             ),
             Kind::ActivationRequested => f.write_str("the gripper was asked to activate: it moves"),
             Kind::Calibration(Try::Taken) => f.write_str("calibrated on the flat hand"),

@@ -24,6 +24,7 @@
 #![forbid(unsafe_code)]
 
 pub mod app;
+mod axis;
 pub mod board;
 pub mod calibration;
 pub mod clutch;

@@ -223,14 +223,6 @@ impl<const X: usize> Telemetry<X> {
     }
 }
 
-/// Names of the 3-Finger gripper's axes; a 2-Finger one's only axis goes by the first word.
-const AXIS_NAMES: [&str; 4] = ["finger A", "finger B", "finger C", "the scissor"];
-
-/// An axis in words.
-pub(crate) fn axis_name(axis: u8) -> &'static str {
-    AXIS_NAMES.get(usize::from(axis)).unwrap_or(&"an axis")
-}
-
 /// Counts one more.
 pub(crate) fn bump(counter: &mut u32) {
     *counter = counter.saturating_add(1);

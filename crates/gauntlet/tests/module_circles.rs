@@ -2,7 +2,7 @@
 #![allow(missing_docs, clippy::unwrap_used)]
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// A path, word by word from the crate's root.
 type Words = Vec<String>;
@@ -15,11 +15,14 @@ fn modules(folder: &Path, name: &str, all: &mut BTreeMap<String, String>) {
         let inner = [name, &stem].into_iter().filter(|word| !word.is_empty());
         let inner = inner.collect::<Vec<_>>().join("::");
         if path.is_dir() {
-            modules(&path, &inner, all);
-        } else if !stem.ends_with("tests") && stem != "main" {
+            // Programs of their own.
+            if inner != "bin" {
+                modules(&path, &inner, all);
+            }
+        } else if !stem.ends_with("tests") && (stem != "main" || !folder.join("lib.rs").exists()) {
             let text = std::fs::read_to_string(&path).unwrap();
             let module = match stem.as_str() {
-                "mod" | "lib" => name.to_owned(),
+                "mod" | "lib" | "main" => name.to_owned(),
                 _ => inner,
             };
             all.insert(module, bare(&text));
@@ -27,11 +30,31 @@ fn modules(folder: &Path, name: &str, all: &mut BTreeMap<String, String>) {
     }
 }
 
+/// Without what is there in tests only: a module in a file of its own, or an item with all that is in its braces.
+fn untested(text: &str) -> String {
+    let margin = |line: &str| line.len() - line.trim_start().len();
+    let mut kept = String::new();
+    let mut lines = text.lines();
+    while let Some(line) = lines.next() {
+        if line.trim() == "#[cfg(test)]" {
+            let mut is_open = false;
+            let ends = |end: &str| {
+                is_open |= end.ends_with('{');
+                margin(end) == margin(line) && (end.trim() == "}" || !is_open && end.ends_with(';'))
+            };
+            assert!(lines.any(ends), "an item of the tests has no end");
+        } else {
+            kept.push_str(line);
+            kept.push('\n');
+        }
+    }
+    kept
+}
+
 /// Without the tests, comments and texts, which name modules without needing them.
 fn bare(text: &str) -> String {
-    let code = text.split("#[cfg(test)]").next().unwrap();
     let mut kept = String::new();
-    for line in code
+    for line in untested(text)
         .lines()
         .filter(|line| !line.trim_start().starts_with("//"))
     {
@@ -87,6 +110,7 @@ struct Crate {
 impl Crate {
     fn read(source: &Path) -> Self {
         let mut modules = BTreeMap::new();
+        modules.insert(String::new(), String::new());
         self::modules(source, "", &mut modules);
         Self {
             modules,
@@ -168,6 +192,11 @@ impl Crate {
         let known = |count: &usize| self.modules.contains_key(&path[..*count].join("::"));
         let count = (0..=path.len()).rev().find(known).unwrap();
         let module = path[..count].join("::");
+        // A file of another package.
+        let beside = path.get(count).map(|name| format!("mod {name};"));
+        if beside.is_some_and(|beside| self.modules[&module].contains(&beside)) {
+            return path[..=count].join("::");
+        }
         let handed = path
             .get(count)
             .and_then(|name| self.handed_on.get(&(module.clone(), name.clone())));
@@ -203,7 +232,10 @@ impl Crate {
         }
         let mut circles: Vec<Vec<String>> = Vec::new();
         for (module, all) in reached.iter().filter(|(module, all)| all.contains(*module)) {
-            let mutual = all.iter().filter(|other| reached[*other].contains(module));
+            let mutual = all.iter().filter(|other| {
+                let back = reached.get(*other);
+                back.is_some_and(|back| back.contains(module))
+            });
             let circle: Vec<String> = mutual.cloned().collect();
             if !circles.contains(&circle) {
                 circles.push(circle);
@@ -226,15 +258,46 @@ fn used(line: &str) -> Option<(bool, &str)> {
     Some((true, public.trim_start().strip_prefix("use ")?))
 }
 
-#[test]
-fn no_module_of_the_library_or_of_the_tool_is_in_a_circle() {
-    let crates = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
-    for name in ["host", "gauntlet"] {
-        let read = Crate::read(&crates.join(name).join("src"));
-        assert!(read.modules.len() > 40, "{name}");
-        let circles = read.circles();
-        assert!(circles.is_empty(), "{name}: {circles:#?}");
+/// The sources of all packages below `folder`: what lies beside a `Cargo.toml`, and programs of several files.
+fn packages(folder: &Path, found: &mut Vec<PathBuf>) {
+    let source = folder.join("src");
+    if folder.join("Cargo.toml").exists() && source.exists() {
+        let programs = std::fs::read_dir(source.join("bin"));
+        let programs = programs.into_iter().flatten();
+        let programs = programs.map(|entry| entry.unwrap().path());
+        found.extend(programs.filter(|path| path.is_dir()));
+        found.push(source);
     }
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let entry = entry.unwrap();
+        let name = entry.file_name().into_string().unwrap();
+        let is_searched = !name.starts_with('.') && !["target", "src"].contains(&name.as_str());
+        if is_searched && entry.file_type().unwrap().is_dir() {
+            packages(&entry.path(), found);
+        }
+    }
+}
+
+#[test]
+fn no_module_of_any_package_is_in_a_circle() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut sources = Vec::new();
+    packages(&root, &mut sources);
+    let mut modules = 0;
+    let mut circles = BTreeMap::new();
+    for source in &sources {
+        let read = Crate::read(source);
+        modules += read.modules.len();
+        let found = read.circles();
+        if !found.is_empty() {
+            circles.insert(source, found);
+        }
+    }
+    assert!(
+        sources.len() > 10 && modules > 600,
+        "{sources:?}: {modules}"
+    );
+    assert!(circles.is_empty(), "{circles:#?}");
 }
 
 #[test]
@@ -264,6 +327,15 @@ fn a_circle_is_found_by_way_of_a_third_and_a_front_is_none() {
         ("a::two", "use super::One;"),
     ]);
     assert!(front.circles().is_empty());
+    let tested = source(&[
+        ("a", "#[cfg(test)]\nmod tests;\nuse crate::b::B;"),
+        (
+            "b",
+            "#[cfg(test)]\nmod tests {\n    use crate::c::C;\n}\nuse crate::a::A;",
+        ),
+        ("c", "use crate::b::B;"),
+    ]);
+    assert_eq!(tested.circles(), [["a", "b"]]);
     let back = source(&[
         ("a", "mod one;\nuse one::One;\npub struct Zero;"),
         ("a::one", "use super::Zero;"),

@@ -8,8 +8,6 @@
 //! Every transcendental comes from `libm`, and products and sums are rounded one by one: the same inputs give the same
 //! bits on every machine.
 
-use nalgebra::UnitQuaternion;
-
 pub mod beyond;
 mod calibration;
 pub mod flat;
@@ -17,15 +15,13 @@ pub(crate) mod rotation;
 pub mod shape;
 
 pub use calibration::Calibration;
+pub use rotation::Quaternion;
 
 /// Number of joint angles.
 pub const JOINT_COUNT: usize = 25;
 
 /// Number of segments, each with one sensor. Segment `k` carries sensor `k`.
 pub const SEGMENT_COUNT: usize = 16;
-
-/// An orientation: from the segment's frame to the sensor's world frame.
-pub type Quaternion = UnitQuaternion<f32>;
 
 /// Names of the joint angles, in the order every file and interface shares.
 pub const JOINT_NAMES: [&str; JOINT_COUNT] = [

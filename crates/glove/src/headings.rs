@@ -22,13 +22,11 @@ mod regain;
 mod report;
 
 pub use asked::{FLAT_FOR, Known};
+pub use flat::POSE_SCANS;
 pub use report::{NotFlat, PoseReport, Reading, to_blame};
 
 /// Each joint's filter has its turn every so many scans; all joints share them out.
 pub const SPREAD: u8 = 5;
-
-/// A flat pose needs this many scans of a sensor.
-pub const POSE_SCANS: u16 = 10;
 
 /// A joint that was degraded is used again below this share of [`Config::degraded`].
 const RECOVERED: f32 = 0.9;
@@ -85,7 +83,7 @@ impl Headings {
         let unmount = profile.mounting.map(|m| m.inverse());
         let axes = core::array::from_fn(|k| {
             let parent = hand::parent(k).unwrap_or(0);
-            let (own, of_parent) = match kind(k) {
+            let (own, of_parent) = match Kind::of(k) {
                 Kind::Hinge => (profile.axes[k], profile.axes[k]),
                 Kind::Mcp => (algebra::X, algebra::X),
                 Kind::Cmc => (algebra::X, algebra::rotate(&profile.thumb_base, algebra::X)),
@@ -100,7 +98,7 @@ impl Headings {
             config,
             unmount,
             axes,
-            joints: core::array::from_fn(|k| Joint::new(kind(k))),
+            joints: core::array::from_fn(|k| Joint::new(Kind::of(k))),
             regain: Regain::new(),
             finder: Finder::new(),
             asked: None,
@@ -236,7 +234,7 @@ impl Headings {
 
     /// The squared sine of the flexion of a base joint: how much of its look is twist.
     fn bent(&self, k: usize) -> f32 {
-        if kind(k) != Kind::Mcp {
+        if Kind::of(k) != Kind::Mcp {
             return 0.0;
         }
         let joint = hand::first_joint((k - 1) / 3);
@@ -344,15 +342,6 @@ impl Headings {
 fn is_there(good: u16, k: usize) -> bool {
     let parent = hand::parent(k).unwrap_or(0);
     good >> k & 1 == 1 && good >> parent & 1 == 1
-}
-
-/// What the joint between a segment and its parent is.
-fn kind(segment: usize) -> Kind {
-    match segment {
-        1 => Kind::Cmc,
-        k if is_base(k) => Kind::Mcp,
-        _ => Kind::Hinge,
-    }
 }
 
 /// The angles of the joint between a segment and its parent, as a bit mask.

@@ -16,18 +16,19 @@ use crate::bus::{Batch, Bus, Error, Reply};
 use crate::timing::{self, after};
 use command::Expected;
 use heapless::Vec;
-use speed::Speeds;
+use speeds::Speeds;
 
 mod blocking;
 mod command;
 mod config;
 mod recovery;
 mod speed;
+mod speeds;
 
 pub use blocking::Blocking;
 pub use command::{baud_divisor, register};
 pub use config::{Config, Counters};
-pub use speed::{BaudRefused, FLOOR, LOSSES_MAX, RAISE_TRIES, RESET_BAUD, SPEEDS, SetBaud, TRIAL};
+pub use speeds::{BaudRefused, FLOOR, LOSSES_MAX, RAISE_TRIES, RESET_BAUD, SPEEDS, SetBaud, TRIAL};
 
 /// A serial port that does not block: `read_ready` before `read`, and writes that go to a queue.
 pub trait SerialPort: embedded_io::Read + embedded_io::ReadReady + embedded_io::Write {}

@@ -9,98 +9,29 @@
 //! brought up again between scans, one step a scan, while the others go on.
 
 use crate::bus::Bus;
-use crate::hand::{Quaternion, SEGMENT_COUNT};
+use crate::hand::SEGMENT_COUNT;
 use crate::sc18im::{self, Sc18im};
 use crate::{Duration, Instant, imu, mux};
 use sensor::Sensor;
 
+mod counters;
 mod exchange;
 mod finding;
+mod frame;
 mod frozen;
+mod ids;
 mod machine;
+mod round;
 mod sensor;
 mod suspect;
 mod together;
 mod twins;
 mod unique;
 
+pub use counters::Counters;
 pub use finding::Finding;
-pub use unique::IdsKnown;
-
-/// One sensor's part of a frame.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    /// The newest good orientation (identity before the first); its sign is continuous from sample to sample.
-    pub orientation: Quaternion,
-    /// When that orientation was asked for: it is at most one fusion period (10 ms) older.
-    pub stamp: Instant,
-    /// What this scan found. Anything but [`Health::Good`]: `orientation` and `stamp` are those of an earlier scan.
-    pub health: Health,
-}
-
-/// What one scan found at one sensor.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Health {
-    /// A fresh, checked sample.
-    Good,
-    /// The sensor is being brought up for the first time, or its fusion has not given anything yet.
-    Starting,
-    /// It does not answer, or could not be brought up.
-    Missing(imu::Error),
-    /// It answered with bytes that are not used.
-    Rejected(imu::Fault),
-}
-
-impl Health {
-    /// Whether the sample may be used.
-    pub fn is_good(self) -> bool {
-        self == Health::Good
-    }
-}
-
-impl core::fmt::Display for Health {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Health::Good => f.write_str("good"),
-            Health::Starting => f.write_str("starting"),
-            Health::Missing(error) => write!(f, "missing: {error}"),
-            Health::Rejected(fault) => write!(f, "rejected: {fault}"),
-        }
-    }
-}
-
-/// Something that went wrong with one sensor: mended since, or not yet ([`Health`] tells).
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Trouble {
-    /// What it was, with the sensor's register.
-    pub error: imu::Error,
-    /// When it was found.
-    pub at: Instant,
-    /// How often anything went wrong with this sensor until then.
-    pub count: u32,
-}
-
-/// One scan: 16 samples in the order of [`crate::hand::SEGMENT_NAMES`].
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Frame {
-    /// One sample a segment.
-    pub samples: [Sample; SEGMENT_COUNT],
-    /// Counts frames from 0; wraps.
-    pub sequence: u32,
-}
-
-impl Frame {
-    /// The orientations alone, for [`crate::hand::joint_angles`].
-    pub fn orientations(&self) -> [Quaternion; SEGMENT_COUNT] {
-        self.samples.map(|sample| sample.orientation)
-    }
-
-    /// Which sensors are good, as a bit mask (bit `k` is segment `k`).
-    pub fn good(&self) -> u16 {
-        let bit = |(k, sample): (usize, &Sample)| u16::from(sample.health.is_good()) << k;
-        self.samples.iter().enumerate().map(bit).sum()
-    }
-}
+pub use frame::{Frame, Health, Sample, Trouble};
+pub use ids::IdsKnown;
 
 /// What the scanner is doing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -113,43 +44,6 @@ pub enum State {
     Starting,
     /// Frames come.
     Scanning,
-}
-
-/// Counts since start; each wraps.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Counters {
-    /// Frames delivered.
-    pub frames: u32,
-    /// Good samples.
-    pub good: u32,
-    /// Samples in which bit 15 of one component was flipped and put back; they count as good.
-    pub repaired: u32,
-    /// Samples that did not come: no answer, or bytes lost.
-    pub missed: u32,
-    /// Samples refused: all zero.
-    pub zero: u32,
-    /// Samples refused: norm.
-    pub not_unit: u32,
-    /// Samples refused: the sensor has restarted.
-    pub restarted: u32,
-    /// Samples refused: too fast.
-    pub too_fast: u32,
-    /// Samples refused: the first after a time without any.
-    pub away: u32,
-    /// Samples refused: frozen, alone or all together.
-    pub frozen: u32,
-    /// Samples refused: the same bits as on another channel.
-    pub twins: u32,
-    /// Jumps that no hand makes and that stayed: each a new beginning of its sensor.
-    pub jumps: u32,
-    /// Findings that nobody took in time.
-    pub findings_lost: u32,
-    /// Selections of a channel that were not confirmed.
-    pub mux_errors: u32,
-    /// Steps of a bring-up that failed for good.
-    pub failed_starts: u32,
-    /// How often each sensor came up; more than once means its heading may have started anew (calibrate again).
-    pub starts: [u16; SEGMENT_COUNT],
 }
 
 /// Most findings kept for [`BusScanner::next_finding`]; one for every sensor.
@@ -201,11 +95,11 @@ pub struct BusScanner<B> {
     sensors: [Sensor; SEGMENT_COUNT],
     frozen: frozen::Detector,
     twins: twins::Detector,
-    ids: unique::Ids,
+    ids: ids::Ids,
     findings: heapless::Deque<Finding, FINDINGS_MAX>,
-    job: Option<machine::Job>,
-    step: Option<machine::ActiveStep>,
-    phase: machine::Phase,
+    job: Option<round::Job>,
+    step: Option<round::ActiveStep>,
+    phase: round::Phase,
     /// When anything on the bus answered last.
     answered: Instant,
     /// Stamp of the newest good sample of any sensor.
@@ -266,11 +160,11 @@ impl<B: Bus> BusScanner<B> {
             sensors: core::array::from_fn(|_| Sensor::new()),
             frozen: frozen::Detector::new(),
             twins: twins::Detector::new(),
-            ids: unique::Ids::new(),
+            ids: ids::Ids::new(),
             findings: heapless::Deque::new(),
             job: None,
             step: None,
-            phase: machine::Phase::Starting,
+            phase: round::Phase::Starting,
             answered: Instant::from_ticks(0),
             seen: Instant::from_ticks(0),
             counters: Counters::default(),
@@ -315,7 +209,7 @@ impl<B: Bus> BusScanner<B> {
         } else if !self.bus.is_up() {
             State::Resync
         } else if self.sensors.iter().any(Sensor::is_running)
-            && !matches!(self.phase, machine::Phase::Starting)
+            && !matches!(self.phase, round::Phase::Starting)
         {
             State::Scanning
         } else {

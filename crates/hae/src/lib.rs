@@ -37,10 +37,13 @@ mod kernel;
 mod map;
 
 pub use kernel::{Kernel, PackedBuffer, packed_len};
-pub use map::{INPUT_LIMIT, InputError, Map, RepackError};
+pub use map::{InputError, Map, RepackError};
 
 #[cfg(target_endian = "big")]
 compile_error!("weights images are read in place and are little-endian");
+
+/// Largest magnitude of an input: 2π rad (as f32, 6.2831855).
+pub const INPUT_LIMIT: f32 = core::f32::consts::TAU;
 
 /// Lanes of the output sums; hidden units are padded to a multiple of it.
 pub const LANES: usize = 16;

@@ -2,11 +2,9 @@
 
 use core::fmt;
 
+use crate::INPUT_LIMIT;
 use crate::image::{self, Checked, Element, Error, HEADER_LEN, JointOrder};
 use crate::kernel::{IntegerWeights, Kernel, Weights, all_in_range};
-
-/// Largest magnitude of an input: 2π rad (as f32, 6.2831855).
-pub const INPUT_LIMIT: f32 = core::f32::consts::TAU;
 
 /// An input the map refuses before it computes anything.
 #[derive(Clone, Copy, Debug, PartialEq)]

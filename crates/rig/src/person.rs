@@ -19,12 +19,16 @@ mod attitude;
 mod motion;
 mod playing;
 mod session;
+mod task;
 
 use crate::PoseSource;
 use crate::chance::{Chance, smooth};
 
 pub use playing::Playing;
 pub use session::{Prompt, guided};
+pub use task::{Attitude, Task};
+
+use task::Asked;
 
 /// Who the person is. Angles in degrees, times in seconds.
 #[derive(Debug, Clone, PartialEq)]
@@ -96,60 +100,6 @@ pub const LATEST_S: f64 = 0.7;
 /// How long a person takes from what it did to what is asked, seconds.
 pub const MOVE_S: f64 = 0.8;
 
-/// How the hand is held in use.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Attitude {
-    /// Palm down, rolling and pitching by up to 30°.
-    PalmDown,
-    /// Thumb up, within 12°.
-    ThumbUp,
-    /// Any way.
-    Free,
-    /// Rolled about the forearm (90: the thumb of a right hand up) and pitched (−80: the fingers down, 80: up) by so many degrees from
-    /// palm down, within 6°.
-    Steady {
-        /// About the forearm.
-        roll: f64,
-        /// Of the fingers above the wrist.
-        pitch: f64,
-    },
-}
-
-/// What a person can be asked to do.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Task {
-    /// Flat on the table, still.
-    Flat,
-    /// Lifted and turned all ways, like a board: 12 s.
-    Turn,
-    /// One finger (0 thumb to 4 little) bent and stretched twice in 2 s, the others still.
-    Alone(usize),
-    /// Four fists in 8 s, turning the hand between them.
-    Fists,
-    /// The thumb out and across the palm, twice in 4 s.
-    Thumb,
-    /// All fingers as the person likes.
-    Free,
-    /// All fingers as the person likes, the hand held so.
-    Use(Attitude),
-    /// This posture (25 angles, radians, in the order of `glove::hand::JOINT_NAMES`), palm down; as exact as the person is.
-    Posture([f64; 25]),
-    /// The same with the hand held so.
-    Held([f64; 25], Attitude),
-}
-
-/// Something that was asked, and when the person begins it.
-#[derive(Debug, Clone)]
-struct Asked {
-    task: Task,
-    begins: f64,
-    chance: Chance,
-    /// Off straight, degrees.
-    off: [f64; 25],
-    /// Of its attitude, against what was asked before.
-    sign: f64,
-}
-
 /// The person.
 #[derive(Debug, Clone)]
 pub struct Person {
@@ -170,7 +120,7 @@ impl Person {
     pub fn new(traits: Traits) -> Self {
         let chance = Chance::new(traits.seed);
         let sag = std::array::from_fn(|j| traits.sag * chance.of(1).even(j as i64));
-        let middle = motion::middle(chance.of(2));
+        let middle = middle(chance.of(2));
         let mut person = Self {
             traits,
             chance,
@@ -252,6 +202,15 @@ impl Person {
             goes_on.then_some((asked, weight))
         })
     }
+}
+
+/// The middles of a person's free motion, degrees: spread fingers, the little one most.
+fn middle(chance: Chance) -> [f64; 25] {
+    let spread = [5.0, 6.0, 0.0, -4.0, -12.0];
+    std::array::from_fn(|j| match j % 5 {
+        1 => spread[j / 5] + 4.0 * chance.even(j as i64),
+        _ => 0.0,
+    })
 }
 
 impl PoseSource for Person {

@@ -10,6 +10,7 @@ mod check;
 pub mod checkpoint;
 mod clock;
 mod drive;
+mod estimate;
 mod settings;
 pub mod starts;
 mod taught;

@@ -12,6 +12,7 @@ pub mod algorithm;
 pub mod cost;
 pub mod data;
 pub mod hand;
+mod hexadecimal;
 pub(crate) mod kernel;
 pub mod measures;
 pub mod model;

@@ -1,6 +1,7 @@
 //! The board: the only code that knows addresses. Another board is another module like this one: a [`firmware::Chip`] and
 //! its devices; `docs/porting.md` lists what each part must do.
 
+mod clock;
 mod flash;
 mod interrupts;
 mod restart;
@@ -22,9 +23,6 @@ use stack::StackWatch;
 use time::{SystemTime, wait_for_interrupt};
 use uart::{Port, Uart, bytes_lost};
 use watchdog::Watchdog;
-
-/// The processor's and the peripheral bus's clock of the emulated board, in hertz (Arm AN386).
-pub const CLOCK_HZ: u32 = 25_000_000;
 
 /// Highest speed of the glove's line, baud. A board sets it to what its cable and its processor carry: at 460,800 the glove gives
 /// three times as many scans. The emulator's bytes pass through a PC that has other work.

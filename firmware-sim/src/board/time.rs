@@ -3,7 +3,7 @@
 //!
 //! Ticks are not counted: an emulator that is kept waiting by its host merges interrupts, and time would run slow.
 
-use super::CLOCK_HZ;
+use super::clock::CLOCK_HZ;
 use bridge::Instant;
 use core::cell::Cell;
 use cortex_m::peripheral::SYST;

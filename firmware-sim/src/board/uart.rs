@@ -173,7 +173,7 @@ impl Port {
         if !first {
             return None;
         }
-        uart.write(BAUD_DIVIDER, super::CLOCK_HZ / BAUD);
+        uart.write(BAUD_DIVIDER, super::clock::CLOCK_HZ / BAUD);
         uart.write(CONTROL, CONTROL_ALL);
         Some(Self { uart })
     }
@@ -182,7 +182,7 @@ impl Port {
 impl SetBaud for Port {
     /// What is queued goes out at the new speed: the caller waits until it has left. What came at the old one is thrown away.
     fn set_baud(&mut self, baud: u32) -> Result<(), BaudRefused> {
-        let divider = super::CLOCK_HZ / baud.max(1);
+        let divider = super::clock::CLOCK_HZ / baud.max(1);
         // The receiver samples each bit at one of 16 ticks of the divider.
         if divider < SMALLEST_DIVIDER {
             return Err(BaudRefused::Unsupported(baud));

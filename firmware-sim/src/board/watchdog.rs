@@ -1,6 +1,6 @@
 //! The CMSDK APB watchdog (Arm DDI 0479, chapter 4.5): resets the machine unless fed.
 
-use super::CLOCK_HZ;
+use super::clock::CLOCK_HZ;
 
 const BASE: usize = 0x4000_8000;
 const LOAD: usize = 0x00;

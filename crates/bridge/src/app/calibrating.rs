@@ -2,45 +2,16 @@
 //! it ends, taken back on request.
 
 use super::App;
+use super::flat_try::{Calibrating, Flat, Replaced};
 use crate::board::Board;
 use crate::calibration::{Refusal, Try};
 use crate::event::{Kind, Request};
-use crate::posture::Basis;
 use crate::{Duration, Instant};
 use glove::calibration::{Bound, Misfit};
 use glove::hand::flat::{FlatHand, Progress};
 use glove::hand::{Calibration, SEGMENT_COUNT};
 use glove::headings::NotFlat;
 use glove::scan::Frame;
-
-/// What is known of calibrating beside what is in use.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Calibrating {
-    /// The try under way.
-    flat: Option<Flat>,
-    /// What the calibration in use replaced: `None` where nothing was replaced yet.
-    before: Option<Replaced>,
-}
-
-/// A hand that is to lie flat.
-#[derive(Debug, Clone)]
-struct Flat {
-    hand: FlatHand,
-    until: Instant,
-    /// What it is for: headings by the profile, else a calibration of sensors that sit straight.
-    is_pose: bool,
-    /// Why a pose that was still was not taken.
-    tilted: Option<Refusal>,
-}
-
-/// What was in use, and what it was worth then.
-#[derive(Debug, Clone)]
-struct Replaced {
-    basis: Basis,
-    /// How often each sensor had been started when a calibration of sensors that sit straight was made.
-    starts: Option<[u16; SEGMENT_COUNT]>,
-    distrusted: u16,
-}
 
 impl<B: Board<X>, const X: usize> App<B, X> {
     /// Takes the glove's profile, or none. Nothing is calibrated then before a flat pose, and nothing can be taken back.

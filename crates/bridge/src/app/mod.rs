@@ -11,6 +11,7 @@
 //! driver handed the request that carries the command to its port ([`gripper::Event::Sent`]). The 29 bytes of the request then take 2.5 ms at 115200 baud.
 
 mod calibrating;
+mod flat_try;
 mod tick;
 mod worn;
 
@@ -23,7 +24,7 @@ use crate::store::{Expected, WeightsStore, profile::ProfileStore};
 use crate::supervisor::{Hand, State, Supervisor};
 use crate::telemetry::{Sent, Telemetry};
 use crate::{HIDDEN, Instant};
-use calibrating::Calibrating;
+use flat_try::Calibrating;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use glove::scan::{BusScanner, IdsKnown};
 use gripper::{Gripper, Status};

@@ -5,12 +5,14 @@
 
 mod configuration;
 pub mod frame;
+mod gate;
 mod incoming;
 pub mod message;
 mod outgoing;
 mod profiles;
 mod server;
 mod slow;
+mod streaming;
 mod telling;
 mod wire;
 

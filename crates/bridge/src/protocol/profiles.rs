@@ -1,7 +1,7 @@
 //! The glove's profile over the line.
 
+use super::gate::idle;
 use super::message::{Answer, Call, PROFILE_CHUNK, ProfilePart, Refusal};
-use super::server::idle;
 use crate::store::profile::{Error, ProfileStore};
 use crate::{App, Board};
 

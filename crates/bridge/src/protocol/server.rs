@@ -2,6 +2,7 @@
 
 use super::configuration::{self};
 use super::frame::{Decoder, MAX_MESSAGE};
+use super::gate::idle;
 use super::message::{
     Answer, CHUNK, Call, Configuration, FromBridge, Hello, Refusal, Reply, Request, Restart,
     SensorIds, VERSION,
@@ -408,17 +409,6 @@ impl<S: Read + ReadReady + Write> Server<S> {
             }),
         };
         Ok(Answer::Done)
-    }
-}
-
-/// The app, if its clutch is open.
-pub(super) fn idle<B: Board<X>, const X: usize>(
-    app: &mut App<B, X>,
-) -> Result<&mut App<B, X>, Refusal> {
-    if app.is_engaged() {
-        Err(Refusal::Engaged)
-    } else {
-        Ok(app)
     }
 }
 

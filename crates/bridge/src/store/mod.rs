@@ -15,49 +15,19 @@
 //!
 //! Program unit: [`PAGE`] bytes at most, a multiple of the flash's own unit, each programmed once per erase.
 
+mod contents;
 mod error;
 pub mod profile;
 mod record;
 mod slot;
 mod writing;
 
+pub use contents::{Contents, Expected, Image, PAGE};
 pub use error::Error;
 
 use crate::board::Slot;
-use hae::image::{Checked, JointOrder, Verifier};
+use hae::image::Verifier;
 use slot::{fits, inspect, is_erased, records, stride};
-
-/// Bytes programmed at once, at most.
-pub const PAGE: usize = 256;
-
-/// What an image must be to be taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Expected {
-    /// Inputs, hidden units, outputs.
-    pub shape: [usize; 3],
-    /// Order of the inputs.
-    pub joint_order: JointOrder,
-}
-
-/// A whole image in a slot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Image {
-    /// Proof that it was checked; its header.
-    pub checked: Checked,
-    /// Sequence of its newest record.
-    pub sequence: u32,
-}
-
-/// What a slot holds.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Contents {
-    /// No record: nothing was ever committed, or a write was begun.
-    Empty,
-    /// A record, and an image that is not what the record says or not for this bridge.
-    Damaged(Error),
-    /// A whole image.
-    Whole(Image),
-}
 
 /// An image on its way into a slot.
 struct Write {

@@ -162,7 +162,7 @@ impl core::fmt::Display for GripperFault {
             GripperFault::Implausible { axis } => write!(
                 f,
                 "the gripper says that {} is where it cannot have come: look at it, open the clutch; if it stays so, activate it anew",
-                crate::telemetry::axis_name(*axis)
+                crate::axis::name(*axis)
             ),
             GripperFault::CommandIgnored => f.write_str("the gripper does not go to its commands"),
         }

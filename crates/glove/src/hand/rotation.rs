@@ -1,7 +1,9 @@
 //! Rotations about the joint axes, and back to angles.
 
-use super::Quaternion;
-use nalgebra::Quaternion as Raw;
+use nalgebra::{Quaternion as Raw, UnitQuaternion};
+
+/// An orientation: from the segment's frame to the sensor's world frame.
+pub type Quaternion = UnitQuaternion<f32>;
 
 /// `R_x(angle)`, radians.
 pub(super) fn about_x(angle: f32) -> Quaternion {

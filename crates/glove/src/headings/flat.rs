@@ -1,11 +1,13 @@
 //! Flat poses while the hand works: the heading across every joint, as a flat hand shows it; and finding such a pose by itself.
 
 use super::joint::Kind;
-use super::kind;
 use crate::calibration::algebra::{self, Half, rad};
 use crate::hand::{self, JOINT_COUNT, Quaternion, SEGMENT_COUNT};
 use crate::timing::since;
 use crate::{Duration, Instant};
+
+/// A flat pose needs this many scans of a sensor.
+pub const POSE_SCANS: u16 = 10;
 
 /// A pose is taken from this much of it.
 pub(super) const LASTS: Duration = Duration::from_ticks(1_500_000);
@@ -96,7 +98,7 @@ impl Pose {
 
     /// The heading across joint `k`; `None` with too few scans.
     pub fn heading(&self, k: usize) -> Option<f32> {
-        let enough = *self.n.get(k)? >= super::POSE_SCANS;
+        let enough = *self.n.get(k)? >= POSE_SCANS;
         let [w, z] = *self.sums.get(k)?;
         enough.then(|| algebra::about_up(w, z))
     }
@@ -105,7 +107,7 @@ impl Pose {
     /// scans.
     pub fn tilt(&self, k: usize) -> Option<f32> {
         let n = *self.n.get(k)?;
-        if n < super::POSE_SCANS || (1..4).contains(&k) {
+        if n < POSE_SCANS || (1..4).contains(&k) {
             return None;
         }
         let cos = self.up[k] / f32::from(n);
@@ -218,7 +220,7 @@ impl Seen<'_> {
             .all(|k| {
                 let finger = (k - 1) / 3;
                 let joint = hand::first_joint(finger) + [0, 3, 4][(k - 1) % 3];
-                match (finger, kind(k)) {
+                match (finger, Kind::of(k)) {
                     (0, Kind::Cmc) => true,
                     // Without a heading its angle means nothing; a hinge soon has one.
                     (_, Kind::Mcp) if self.held >> joint & 1 == 1 => {

@@ -2,6 +2,7 @@
 //! it (soft tissue, an axis a little off; at a joint of three degrees of freedom the person's mean posture).
 
 use crate::calibration::algebra::{self, Half, rad};
+use crate::calibration::solve::is_base;
 use crate::timing::since;
 use crate::{Duration, Instant};
 
@@ -31,6 +32,15 @@ const LEAST: f32 = 1e-12;
 pub(super) const ENTERS: f32 = 1.2;
 
 impl Kind {
+    /// What the joint between a segment and its parent is.
+    pub(super) fn of(segment: usize) -> Self {
+        match segment {
+            1 => Self::Cmc,
+            k if is_base(k) => Self::Mcp,
+            _ => Self::Hinge,
+        }
+    }
+
     /// Standard deviation of the heading right after a calibration, radians.
     const fn first(self) -> f32 {
         match self {

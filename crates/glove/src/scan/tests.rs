@@ -1,6 +1,6 @@
 use super::*;
 use crate::bus;
-use crate::hand::segment_orientations;
+use crate::hand::{Quaternion, segment_orientations};
 use crate::imu::{Fault, Mode};
 
 mod fake;

@@ -1,51 +1,11 @@
 //! Which sensor is which: the unique ids, as each bring-up reads them before it changes anything and again at its end, and as a
 //! sensor is asked for it that fell silent.
 
+use super::ids::IdsKnown;
 use super::{BusScanner, Finding};
 use crate::Instant;
 use crate::hand::SEGMENT_COUNT;
 use crate::imu::{Error, UniqueId};
-
-/// The unique ids as they were read last.
-#[derive(Debug, Clone)]
-pub(super) struct Ids {
-    known: [Option<UniqueId>; SEGMENT_COUNT],
-    /// Counts changes of them. Wraps.
-    changes: u16,
-    /// Segments told about (bit k).
-    told: u16,
-    /// The two sensors of one channel, which are two for certain, have the same id: the ids of this glove mean nothing.
-    useless: bool,
-}
-
-/// What tells whether [`BusScanner::ids`] may have changed: cheaper to compare than they are.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct IdsKnown {
-    /// Sensors whose id is known (bit k).
-    pub sensors: u16,
-    /// Counts changes of an id. Wraps.
-    pub changes: u16,
-}
-
-impl Ids {
-    pub fn new() -> Self {
-        Self {
-            known: [None; SEGMENT_COUNT],
-            changes: 0,
-            told: 0,
-            useless: false,
-        }
-    }
-
-    fn set(&mut self, k: usize, id: Option<UniqueId>) {
-        if let Some(known) = self.known.get_mut(k)
-            && *known != id
-        {
-            *known = id;
-            self.changes = self.changes.wrapping_add(1);
-        }
-    }
-}
 
 impl<B> BusScanner<B> {
     /// The unique id of each sensor as it is wired, where it was read since the sensor started over last, and is in no doubt.

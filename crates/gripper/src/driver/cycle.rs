@@ -1,66 +1,17 @@
 //! One cycle after the other: what goes out next, and what to make of what comes back.
 
+use super::doing::Doing;
 use super::family::{Block, Family, Snapshot, may_move};
 use super::task::Stage;
 use super::{Driver, Error};
 use crate::link::{self, Field, LateReply, Refused};
-use crate::registers::{COMMAND, Kind, STATUS};
-use crate::rtu::{Registers, Request, Response, function};
-use crate::{Duration, Instant, Motion, Status, timing};
+use crate::registers::Kind;
+use crate::rtu::{Response, function};
+use crate::{Duration, Instant, Status, timing};
 use embedded_io::{Read, ReadReady, Write};
 
 /// Nobody polled for this long: a task's time goes on from here.
 const STOOD: Duration = Duration::from_secs(1);
-
-/// The request under way.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Doing<const X: usize> {
-    /// Function code: a read's, or FC23.
-    function: u8,
-    /// Registers read.
-    quantity: u16,
-    /// What FC23 writes.
-    block: Block,
-    /// The motion in it.
-    motion: Option<Motion<X>>,
-    /// When it left: what the answer says is counted from here.
-    sent: Instant,
-}
-
-impl<const X: usize> Doing<X> {
-    fn read((function, quantity): (u8, u16)) -> Self {
-        Self {
-            function,
-            quantity,
-            block: Block::default(),
-            motion: None,
-            sent: Instant::from_ticks(0),
-        }
-    }
-
-    /// Whether a motion goes out with it.
-    pub(super) fn carries_motion(&self) -> bool {
-        self.motion.is_some()
-    }
-
-    fn request(&self, registers: u16) -> Request<'_> {
-        let (address, quantity) = (STATUS, self.quantity);
-        let values = self
-            .block
-            .get(..2 * usize::from(registers))
-            .and_then(Registers::from_bytes);
-        match (self.function, values) {
-            (function::READ_WRITE, Some(values)) => Request::ReadWrite {
-                read_address: STATUS,
-                read_quantity: quantity,
-                write_address: COMMAND,
-                values,
-            },
-            (function::READ_INPUT, _) => Request::ReadInput { address, quantity },
-            _ => Request::ReadHolding { address, quantity },
-        }
-    }
-}
 
 impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> {
     /// Takes in what the line brought.

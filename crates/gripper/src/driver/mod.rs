@@ -22,17 +22,21 @@
 //!   outstanding, requests ask for replies of another signature (number of registers, function code).
 
 mod cycle;
+mod doing;
+mod error;
 mod family;
 mod identity;
 mod request_echo;
 mod task;
+mod tasks;
 
+pub use error::Error;
 pub use family::{Control, Family, ThreeFingerFamily, TwoFingerFamily};
 pub use task::{Failure, Outcome, Task};
 
-use crate::registers::{Kind, three_finger::Mode, two_finger};
+use crate::registers::{three_finger::Mode, two_finger};
 use crate::{Duration, Event, Gripper, Instant, Motion, Status, link, timing};
-use cycle::Doing;
+use doing::Doing;
 use embedded_io::{Read, ReadReady, Write};
 use family::Snapshot;
 use identity::Identity;
@@ -98,45 +102,6 @@ impl Config {
             longest_reply,
             patience: self.patience,
         }
-    }
-}
-
-/// What can go wrong with a gripper on a serial line.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum Error {
-    /// The line failed, or what it carried was not believed.
-    Link(link::Error),
-    /// The line is fine; the gripper did not do what it was asked to.
-    Task {
-        /// What was asked.
-        task: Task,
-        /// Why it did not happen.
-        why: Failure,
-    },
-    /// A gripper of this other family answers. Nothing is written to it.
-    OtherGripper(Kind),
-}
-
-impl core::fmt::Display for Error {
-    fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
-        match self {
-            Self::Link(error) => write!(f, "{error}"),
-            Self::Task { task, why } => write!(f, "{task} failed: {why}"),
-            Self::OtherGripper(kind) => write!(
-                f,
-                "a {} answers, another one than it is taken for: name its model",
-                kind.name()
-            ),
-        }
-    }
-}
-
-impl core::error::Error for Error {}
-
-impl From<link::Error> for Error {
-    fn from(error: link::Error) -> Self {
-        Self::Link(error)
     }
 }
 

@@ -3,12 +3,10 @@
 //! A task inspects first (a fresh status), then writes if it has to, then watches until the gripper
 //! says it is done. Every task has a deadline ([`timing`]).
 
-use super::family::{Action, Family, Snapshot};
-use super::{Driver, Error};
+use super::family::{Action, Snapshot};
 use crate::registers::Severity;
 use crate::registers::three_finger::Mode;
 use crate::{Activation, Duration, Fault, Instant, timing};
-use embedded_io::{Read, ReadReady, Write};
 
 /// Something a gripper can be asked to do besides a motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,7 +22,7 @@ pub enum Task {
 }
 
 impl Task {
-    fn limit(self) -> Duration {
+    pub(super) fn limit(self) -> Duration {
         match self {
             Self::Activate => timing::ACTIVATION,
             Self::Reset => timing::RESET,
@@ -118,8 +116,34 @@ pub(super) struct Running {
 }
 
 impl Running {
+    pub(super) fn new(task: Task) -> Self {
+        Self {
+            task,
+            stage: Stage::Inspect,
+            deadline: None,
+            calm: 0,
+            untaken: None,
+        }
+    }
+
+    /// What a status that was believed makes of it.
+    pub(super) fn next<const X: usize>(&mut self, snapshot: &Snapshot<X>) -> Next {
+        match self.task {
+            Task::Activate => activation(self.stage, snapshot),
+            Task::Reset => reset(self.stage, snapshot),
+            Task::Release => release(self.stage, snapshot),
+            Task::Mode(mode) => mode_change(self, mode, snapshot),
+        }
+    }
+
+    /// Its times do not run while nobody looks: the gripper may have ended it long ago.
+    pub(super) fn postpone(&mut self, gap: Duration) {
+        self.deadline = self.deadline.map(|due| timing::after(due, gap));
+        self.untaken = None;
+    }
+
     /// For how long the gripper has not shown what is being written.
-    fn goes_untaken(&mut self, now: Instant) -> Duration {
+    pub(super) fn goes_untaken(&mut self, now: Instant) -> Duration {
         let Stage::Write(action) = self.stage else {
             self.untaken = None;
             return Duration::from_ticks(0);
@@ -138,85 +162,11 @@ impl Running {
 /// by up to one refresh.
 const CALM: u8 = 4;
 
-enum Next {
+/// What becomes of a task.
+pub(super) enum Next {
     Stay(Stage),
     Done,
     Fail(Failure),
-}
-
-impl<S: Read + ReadReady + Write, F: Family<X>, const X: usize> Driver<S, F, X> {
-    pub(super) fn begin_task(&mut self, task: Task) {
-        if let Some(running) = self.running {
-            self.outcome = Some((running.task, Outcome::Replaced));
-        }
-        self.forget_individual();
-        self.running = Some(Running {
-            task,
-            stage: Stage::Inspect,
-            deadline: None,
-            calm: 0,
-            untaken: None,
-        });
-    }
-
-    /// The failure of a task whose time is over.
-    pub(super) fn overdue(&mut self, now: Instant) -> Option<Error> {
-        let running = self.running.as_mut()?;
-        let deadline = *running
-            .deadline
-            .get_or_insert(timing::after(now, running.task.limit()));
-        if now < deadline {
-            None
-        } else {
-            Some(self.fail_task(Failure::Deadline))
-        }
-    }
-
-    /// A task's times do not run while nobody looks: the gripper may have ended it long ago.
-    pub(super) fn postpone_task(&mut self, gap: Duration) {
-        if let Some(running) = &mut self.running {
-            running.deadline = running.deadline.map(|due| timing::after(due, gap));
-            running.untaken = None;
-        }
-    }
-
-    fn fail_task(&mut self, why: Failure) -> Error {
-        let task = self
-            .running
-            .take()
-            .map_or(Task::Reset, |running| running.task);
-        self.outcome = Some((task, Outcome::Failed(why)));
-        Error::Task { task, why }
-    }
-
-    /// Moves the task on after a status that was believed.
-    pub(super) fn step_task(&mut self, snapshot: &Snapshot<X>, now: Instant) -> Result<(), Error> {
-        let patience = self.config.patience.as_ticks().saturating_mul(4);
-        let taken = timing::TAKEN.as_ticks().saturating_add(patience);
-        let Some(running) = &mut self.running else {
-            return Ok(());
-        };
-        let next = match running.task {
-            Task::Activate => activation(running.stage, snapshot),
-            Task::Reset => reset(running.stage, snapshot),
-            Task::Release => release(running.stage, snapshot),
-            Task::Mode(mode) => mode_change(running, mode, snapshot),
-        };
-        match next {
-            Next::Stay(stage) => {
-                running.stage = stage;
-                if running.goes_untaken(now) > Duration::from_ticks(taken) {
-                    return Err(self.fail_task(Failure::NotTaken));
-                }
-            }
-            Next::Done => {
-                self.outcome = Some((running.task, Outcome::Done));
-                self.running = None;
-            }
-            Next::Fail(why) => return Err(self.fail_task(why)),
-        }
-        Ok(())
-    }
 }
 
 fn is_major<const X: usize>(snapshot: &Snapshot<X>) -> bool {

@@ -20,22 +20,21 @@
 
 mod judge;
 mod outstanding;
+mod pending;
 mod port;
 mod trace;
 mod types;
 
 pub use outstanding::LateReply;
 pub use trace::{Counters, Entry, Event, TRACE_BYTES, TRACE_LEN, Trace};
-pub use types::{Config, Error, Field, LocalEcho, MOST_SHIFTED, PortFault, Refused};
+pub use types::{Config, Error, Field, LocalEcho, MAX_REQUEST, MOST_SHIFTED, PortFault, Refused};
 
 use crate::rtu::{Request, Response};
 use crate::{Duration, Instant, timing};
 use embedded_io::{Read, ReadReady, Write};
-use judge::{Pending, Verdict};
 use outstanding::{Outstanding, Signature};
+use pending::{Pending, Verdict};
 
-/// Longest request the link sends, bytes.
-pub const MAX_REQUEST: usize = 64;
 /// Longest reply the link takes, bytes.
 pub const MAX_REPLY: usize = 64;
 /// Bytes read in one poll at most: a port that never runs dry must not hold the loop.

@@ -3,6 +3,8 @@
 use crate::{Duration, rtu, timing};
 use embedded_io::ErrorKind;
 
+/// Longest request the link sends, bytes.
+pub const MAX_REQUEST: usize = 64;
 /// What a link needs to know about its line.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Config {
@@ -53,7 +55,7 @@ impl Config {
     /// The longest an exchange can take: the link's deadline.
     #[must_use]
     pub const fn longest_exchange(&self) -> Duration {
-        let start = self.start_of_reply(super::MAX_REQUEST).as_ticks();
+        let start = self.start_of_reply(MAX_REQUEST).as_ticks();
         let end = self.end_of_reply(self.longest_reply).as_ticks();
         Duration::from_ticks(start.saturating_add(end))
     }

@@ -6,10 +6,12 @@
 //! numbers are the manuals'.
 
 mod fault;
+mod parts;
 pub mod three_finger;
 pub mod two_finger;
 
 pub use fault::{Fault, Severity};
+pub use parts::{Axis, AxisStatus, ReservedBits};
 
 use crate::Contact;
 
@@ -57,50 +59,6 @@ impl Kind {
         let (ready, controller_fault) = (block[0] & 0x31 == 0x31, block[2] & 0xF0 != 0);
         (ready || controller_fault).then_some(Self::TwoFinger)
     }
-}
-
-/// A bit that is always 0 is set: byte and the bits concerned.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct ReservedBits {
-    /// Byte of the block.
-    pub byte: u8,
-    /// The reserved bits that are set in it.
-    pub bits: u8,
-}
-
-/// The first byte of `block` with a bit of `mask` set.
-fn reserved(block: &[u8], mask: &[u8]) -> Result<(), ReservedBits> {
-    for (byte, (value, mask)) in block.iter().zip(mask).enumerate() {
-        if value & mask != 0 {
-            return Err(ReservedBits {
-                byte: byte as u8,
-                bits: value & mask,
-            });
-        }
-    }
-    Ok(())
-}
-
-/// The request for one axis: position, speed, force.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Axis {
-    /// rPRx: 0 open to 255 closed.
-    pub position: u8,
-    /// rSPx: 0 slowest to 255 fastest.
-    pub speed: u8,
-    /// rFRx: 0 least to 255 most.
-    pub force: u8,
-}
-
-/// What an axis reports: echo, position, current.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AxisStatus {
-    /// gPRx: the position last asked for.
-    pub echo: u8,
-    /// gPOx: where it is.
-    pub position: u8,
-    /// gCUx: motor current, 10 mA a count.
-    pub current: u8,
 }
 
 /// A contact from its two bits, and back.

@@ -1,6 +1,7 @@
 //! The 3-Finger Adaptive Gripper: 16 command bytes, 16 status bytes (8 registers each).
 
-use super::{Axis, AxisStatus, Fault, ReservedBits, reserved};
+use super::parts::reserved;
+use super::{Axis, AxisStatus, Fault, ReservedBits};
 use crate::{Activation, Contact, Instant};
 
 /// Bytes of either block.

@@ -1,6 +1,7 @@
 //! The 2F-85, 2F-140 and Hand-E: 6 command bytes, 6 status bytes (3 registers each).
 
-use super::{Axis, AxisStatus, Fault, ReservedBits, reserved};
+use super::parts::reserved;
+use super::{Axis, AxisStatus, Fault, ReservedBits};
 use crate::{Activation, Contact, Instant};
 
 /// Bytes of either block.

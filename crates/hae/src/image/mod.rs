@@ -10,14 +10,19 @@
 //! [`Map::view`](crate::Map::view) looks at the same bytes again at no cost. [`Verifier`] does the same check in small
 //! pieces for a loop that may not stop.
 
+mod bound;
+mod checksum;
 mod encode;
 mod error;
+mod fields;
+mod parameters;
 mod verify;
 
-pub use encode::{Parameters, encode, encoded_len};
+pub use encode::encode;
 pub(crate) use encode::{put_header, seal};
 pub use error::Error;
-pub(crate) use verify::stated_crc;
+pub(crate) use fields::stated_crc;
+pub use parameters::Parameters;
 pub use verify::{Verifier, parse, parse_exact};
 
 use crate::{LANES, units_per_lane};
@@ -36,22 +41,6 @@ pub const MAX_INPUTS: usize = 4096;
 pub const MAX_HIDDEN: usize = 65_536;
 /// Most outputs an image may have.
 pub const MAX_OUTPUTS: usize = 4096;
-
-/// Byte offsets of the header's fields; everything not named here is reserved and zero.
-pub(crate) mod offset {
-    pub const FORMAT: usize = 8;
-    pub const HEADER_LEN: usize = 10;
-    pub const LENGTH: usize = 12;
-    pub const CRC: usize = 16;
-    pub const ELEMENT: usize = 20;
-    pub const ORDER: usize = 22;
-    pub const INPUTS: usize = 24;
-    pub const HIDDEN: usize = 28;
-    pub const OUTPUTS: usize = 32;
-    pub const MODEL_ID: usize = 36;
-    pub const VERSION: usize = 40;
-    pub const RESERVED: usize = 44;
-}
 
 /// What the elements of a map's input vector are, and in which order: an image trained for one order is worthless, and
 /// dangerous, under another.
@@ -180,6 +169,11 @@ pub(crate) const fn record_words(inputs: usize, hidden: usize, outputs: usize) -
 /// Words of all lane records; `b2` follows.
 pub(crate) const fn lane_words(inputs: usize, hidden: usize, outputs: usize) -> usize {
     LANES * record_words(inputs, hidden, outputs)
+}
+
+/// Bytes of an f32 image of this shape: 192 + 64·⌈H/16⌉·(1 + Q + X) + 64·⌈X/16⌉.
+pub const fn encoded_len(inputs: usize, hidden: usize, outputs: usize) -> usize {
+    HEADER_LEN + 4 * lane_words(inputs, hidden, outputs) + (4 * outputs).next_multiple_of(ALIGNMENT)
 }
 
 /// True for shapes that an image can have.

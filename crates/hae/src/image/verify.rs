@@ -2,35 +2,20 @@
 
 use core::ops::Range;
 
-use crc::{CRC_32_ISO_HDLC, Crc, Digest};
+use crc::Digest;
 
+use super::bound::HiddenBound;
+use super::checksum::{CRC32, update};
+use super::fields::{field, offset, u16_at, u32_at};
 use super::{
     ALIGNMENT, Checked, Element, Error, FORMAT, HEADER_LEN, Header, JointOrder, MAGIC, Meta,
-    encoded_len, lane_words, offset, record_words, shape_is_valid,
+    encoded_len, lane_words, record_words, shape_is_valid, stated_crc,
 };
 use crate::quantized::{self, TileCheck};
-use crate::{INPUT_LIMIT, LANES, units_per_lane};
-
-/// CRC-32 as in zip and Ethernet: polynomial 0x04C11DB7 reflected, initial and final exclusive-or 0xFFFFFFFF.
-static CRC32: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use crate::{LANES, units_per_lane};
 
 /// Bytes that one [`Verifier::step`] takes at most through the CRC.
 const CRC_STEP: usize = 1024;
-
-/// Adds the bytes from `start` to `end` to the digest, without the CRC's own four.
-fn update(digest: &mut Digest<'static, u32>, image: &[u8], start: usize, end: usize) {
-    const OWN_END: usize = offset::CRC + 4;
-    for (start, end) in [(start, end.min(offset::CRC)), (start.max(OWN_END), end)] {
-        digest.update(image.get(start..end).unwrap_or(&[]));
-    }
-}
-
-/// CRC-32 of a whole image, its own four bytes left out.
-pub(crate) fn crc32(image: &[u8]) -> u32 {
-    let mut digest = CRC32.digest();
-    update(&mut digest, image, 0, image.len());
-    digest.finalize()
-}
 
 /// Checks the image at the start of `bytes` completely: header, length, CRC-32, padding, finite parameters, no sum that
 /// could overflow. Bytes after the image are not looked at (a flash slot is longer than its image).
@@ -145,27 +130,6 @@ impl Verifier {
         };
         Ok(done.then_some(Checked { header }))
     }
-}
-
-fn field<const N: usize>(bytes: &[u8], at: usize) -> [u8; N] {
-    bytes
-        .get(at..)
-        .and_then(|bytes| bytes.first_chunk())
-        .copied()
-        .unwrap_or([0; N])
-}
-
-fn u16_at(bytes: &[u8], at: usize) -> u16 {
-    u16::from_le_bytes(field(bytes, at))
-}
-
-fn u32_at(bytes: &[u8], at: usize) -> u32 {
-    u32::from_le_bytes(field(bytes, at))
-}
-
-/// The CRC stated in an image's header; 0 if the bytes are too few.
-pub(crate) fn stated_crc(bytes: &[u8]) -> u32 {
-    u32_at(bytes, offset::CRC)
 }
 
 /// Reads and checks the header against itself, the bytes' length and their alignment.
@@ -305,44 +269,5 @@ fn check_output_bias(image: &[u8], header: &Header, bound: &HiddenBound) -> Resu
         Ok(())
     } else {
         Err(Error::Overflow)
-    }
-}
-
-/// Bound of every partial sum for inputs within ±2π: Σ_j max_x|w2_xj|·(|b1_j| + 2π·Σ_i|w1_ji|), plus max_x|b2_x|.
-///
-/// Taken over the worst output, it may refuse weights within a factor X of overflow, some 10³⁶ away from any trained map.
-/// The factor of two below f32::MAX covers the rounding of the bound itself and of the sums.
-pub(crate) struct HiddenBound {
-    sum: f32,
-    largest_hidden: f32,
-}
-
-impl HiddenBound {
-    pub(crate) fn new() -> Self {
-        Self {
-            sum: 0.0,
-            largest_hidden: 0.0,
-        }
-    }
-
-    pub(crate) fn unit<'a>(
-        &mut self,
-        b1: f32,
-        w1: impl Iterator<Item = &'a f32>,
-        w2: impl Iterator<Item = &'a f32>,
-    ) {
-        let weights: f32 = w1.map(|w| w.abs()).sum();
-        let hidden = b1.abs() + weights * INPUT_LIMIT;
-        let largest = w2.fold(0.0f32, |largest, w| largest.max(w.abs()));
-        self.largest_hidden = self.largest_hidden.max(hidden);
-        self.sum += largest * hidden;
-    }
-
-    /// NaN cannot hide an overflow: parameters are finite here, and sums of positive values only grow; 0·∞ shows in
-    /// `largest_hidden`.
-    pub(crate) fn is_safe<'a>(&self, b2: impl Iterator<Item = &'a f32>) -> bool {
-        let bias = b2.fold(0.0f32, |largest, b| largest.max(b.abs()));
-        let limit = f32::MAX / 2.0;
-        self.largest_hidden <= limit && self.sum + bias <= limit
     }
 }

@@ -60,7 +60,11 @@ impl Kernel {
             Self::CortexM4f => cfg!(cortex_m4f),
             Self::Neon => cfg!(target_arch = "aarch64"),
             #[cfg(target_arch = "x86_64")]
-            Self::Sse2 | Self::Avx2 | Self::Avx512 => x86::is_supported(self),
+            Self::Sse2 => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => x86::wide_vectors().0,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => x86::wide_vectors().1,
             #[cfg(not(target_arch = "x86_64"))]
             Self::Sse2 | Self::Avx2 | Self::Avx512 => false,
         }
@@ -263,12 +267,4 @@ impl<'w, const Q: usize, const H: usize, const X: usize> IntegerWeights<'w, Q, H
         }
         integer::eval::<Q, H, X>(self.words, q)
     }
-}
-
-/// Sums 16 lanes: distance 8, 4, 2, 1.
-fn halving_tree(sums: &[f32; LANES]) -> f32 {
-    let eight: [f32; 8] = core::array::from_fn(|k| sums[k] + sums[k + 8]);
-    let four: [f32; 4] = core::array::from_fn(|k| eight[k] + eight[k + 4]);
-    let [a, b, c, d] = four;
-    (a + c) + (b + d)
 }

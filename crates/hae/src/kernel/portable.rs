@@ -6,7 +6,6 @@
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
-use super::halving_tree;
 use crate::image::record_words;
 use crate::{LANES, units_per_lane};
 
@@ -112,4 +111,12 @@ fn add_products<const T: usize>(z: &mut [f32; T], w: &[f32; T], q: f32) {
 fn relu(z: f32) -> f32 {
     let bits = z.to_bits();
     f32::from_bits(bits & !((bits.cast_signed() >> 31).cast_unsigned()))
+}
+
+/// Sums 16 lanes: distance 8, 4, 2, 1.
+fn halving_tree(sums: &[f32; LANES]) -> f32 {
+    let eight: [f32; 8] = core::array::from_fn(|k| sums[k] + sums[k + 8]);
+    let four: [f32; 4] = core::array::from_fn(|k| eight[k] + eight[k + 4]);
+    let [a, b, c, d] = four;
+    (a + c) + (b + d)
 }

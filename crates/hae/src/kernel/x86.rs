@@ -6,25 +6,14 @@
 
 use core::arch::x86_64::*;
 
-use super::Kernel;
 use crate::{LANES, units_per_lane};
 
-/// True if the processor has the instructions and the operating system keeps their registers.
-pub(super) fn is_supported(kernel: Kernel) -> bool {
+/// (AVX2, AVX-512F): whether the processor has the instructions and the operating system keeps their registers, from
+/// CPUID leaves 1 and 7 and XCR0 (Intel SDM vol. 1, §14.3 and §15.2).
+pub(super) fn wide_vectors() -> (bool, bool) {
     if cfg!(miri) {
-        return kernel == Kernel::Sse2;
+        return (false, false);
     }
-    let (avx2, avx512) = wide_vectors();
-    match kernel {
-        Kernel::Sse2 => true,
-        Kernel::Avx2 => avx2,
-        Kernel::Avx512 => avx512,
-        _ => false,
-    }
-}
-
-/// (AVX2, AVX-512F), from CPUID leaves 1 and 7 and XCR0 (Intel SDM vol. 1, §14.3 and §15.2).
-fn wide_vectors() -> (bool, bool) {
     const OSXSAVE_AND_AVX: u32 = 1 << 27 | 1 << 28;
     if __cpuid(0).eax < 7 || __cpuid(1).ecx & OSXSAVE_AND_AVX != OSXSAVE_AND_AVX {
         return (false, false);

@@ -19,13 +19,16 @@
 mod quantize;
 mod verify;
 
-pub use quantize::{encode, encoded_len};
+pub use quantize::encode;
 pub(crate) use verify::TileCheck;
 
-use crate::image::{self, Checked, Element, HEADER_LEN, Parameters};
+use crate::image::{self, ALIGNMENT, Checked, Element, HEADER_LEN};
 
 /// Hidden units computed together; they are padded to a multiple of it.
 pub(crate) const TILE: usize = 6;
+
+/// Largest input scale: 2π times it stays below 2²², as the rounding of inputs needs.
+const MAX_INPUT_SCALE: f32 = 524_288.0;
 
 /// Where things are in the words after the header.
 #[derive(Clone, Copy)]
@@ -73,6 +76,11 @@ impl Layout {
     pub(crate) const fn errors(&self) -> usize {
         self.bias() + self.outputs
     }
+}
+
+/// Bytes of an image in 16-bit integers.
+pub const fn encoded_len(inputs: usize, hidden: usize, outputs: usize) -> usize {
+    HEADER_LEN + (4 * Layout::new(inputs, hidden, outputs).words).next_multiple_of(ALIGNMENT)
 }
 
 /// The largest difference of each output from the f32 map over the calibration poses, in counts, as measured when the
@@ -145,9 +153,4 @@ fn reference_from(
         float(layout.factors() + x)?,
         float(layout.bias() + x)?,
     ))
-}
-
-/// The parameters' shape.
-fn shape(p: &Parameters<'_>) -> [usize; 3] {
-    [p.inputs, p.hidden, p.outputs]
 }

@@ -1,20 +1,13 @@
 //! From f32 parameters and calibration poses to an image in 16-bit integers.
 
-use super::{Layout, TILE, reference_from, shape};
-use crate::image::{ALIGNMENT, Element, Error, HEADER_LEN, Meta, Parameters, put_header, seal};
+use super::{Layout, TILE, encoded_len, reference_from};
+use crate::image::{Element, Error, HEADER_LEN, Meta, Parameters, put_header, seal};
 use crate::{INPUT_LIMIT, reference as f32_reference};
 
-/// Largest input scale: 2π times it stays below 2²², as the rounding of inputs needs.
-pub(super) const MAX_INPUT_SCALE: f32 = 524_288.0;
 /// Room beyond the calibration poses.
 const MARGIN: f32 = 1.25;
 /// Least input range in radians, for joints that the poses do not move.
 const LEAST_RANGE: f32 = 0.25;
-
-/// Bytes of an image in 16-bit integers.
-pub const fn encoded_len(inputs: usize, hidden: usize, outputs: usize) -> usize {
-    HEADER_LEN + (4 * Layout::new(inputs, hidden, outputs).words).next_multiple_of(ALIGNMENT)
-}
 
 /// Quantises `parameters` and writes the image to the start of `out`; returns its length, [`encoded_len`].
 ///
@@ -68,7 +61,7 @@ pub fn encode(
         put_output(p, &layout, words, x)?;
     }
     calibrate(p, poses, &layout, words);
-    put_header(out, shape(p), Element::I16, meta);
+    put_header(out, p.shape(), Element::I16, meta);
     seal(out);
     Ok(length)
 }
@@ -205,7 +198,7 @@ fn calibrate(p: &Parameters<'_>, poses: &[f32], layout: &Layout, words: &mut Wor
         let difference = |words: &Words<'_>, q: &[f32]| {
             let exact = f32_reference::eval_output(p, q, x);
             let integer =
-                reference_from(|at| Some(words.word(at)), shape(p), q, x).unwrap_or(f32::NAN);
+                reference_from(|at| Some(words.word(at)), p.shape(), q, x).unwrap_or(f32::NAN);
             f64::from(integer) - f64::from(exact)
         };
         let rows = poses.chunks_exact(p.inputs);

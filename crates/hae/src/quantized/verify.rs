@@ -1,7 +1,6 @@
 //! The check of an image in 16-bit integers: padding, finite scales, no sum that could overflow.
 
-use super::quantize::MAX_INPUT_SCALE;
-use super::{Layout, TILE, halves};
+use super::{Layout, MAX_INPUT_SCALE, TILE, halves};
 use crate::image::{Error, HEADER_LEN, Header};
 
 /// Checks tile after tile, then what follows them.

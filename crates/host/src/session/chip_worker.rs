@@ -209,7 +209,7 @@ impl Worker {
         }
         for sample in self.link.listen(LISTEN)? {
             let blocked = |axis| self.devices.is_blocked(axis);
-            self.hub.lock().numbers.sample(&sample, blocked);
+            self.hub.lock().sample(&sample, self.clutch, blocked);
             self.devices.sample(&sample);
             if let Some(samples) = &self.samples {
                 // Who keeps them and is slow, or gone, says so.

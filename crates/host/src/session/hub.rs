@@ -8,7 +8,9 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use bridge::clutch::Position;
 use bridge::event::Kind;
+use bridge::protocol::message::Sample;
 use bridge::{HoldReason, State};
 
 use super::driven::{Driven, Moment};
@@ -49,24 +51,39 @@ pub(super) struct Said {
     happened: u64,
     held: Lasting<HoldReason>,
     useless: Lasting<()>,
+    /// Until when it is counted what became of the time.
+    seen: Option<(gripper::Instant, Moment)>,
 }
 
 impl Said {
     /// The newest state. `useless`: no frame of the glove can be used.
     pub fn say(&mut self, now: Snapshot, useless: bool) {
-        if let Some(before) = &self.newest {
-            let passed = now.now.checked_duration_since(before.now);
-            let us = passed.map_or(0, |passed| passed.as_micros());
-            let moment = |seen: &Snapshot| Moment {
-                clutch: seen.clutch,
-                state: seen.state,
-            };
-            let time = Duration::from_micros(us);
-            self.numbers.driven.pass(time, moment(before), moment(&now));
-        }
+        let (clutch, state) = (now.clutch, now.state);
+        self.pass(now.now, Moment { clutch, state });
         self.held.look(now.state.hold_reason(), now.now);
         self.useless.look(useless.then_some(()), now.now);
         self.newest = Some(now);
+    }
+
+    /// A telemetry sample of a bridge on a chip, `clutch` as this program knows it. Samples of a time in which this program stood
+    /// still tell what the bridge made of it: the newest state alone would not, where it follows again by then.
+    pub fn sample(&mut self, sample: &Sample, clutch: Position, blocked: impl Fn(usize) -> bool) {
+        let state = sample.state;
+        let at = gripper::Instant::from_ticks(sample.now_us);
+        self.pass(at, Moment { clutch, state });
+        self.numbers.sample(sample, blocked);
+    }
+
+    /// Counts what became of the time until `at`, where it is not counted yet.
+    fn pass(&mut self, at: gripper::Instant, now: Moment) {
+        if let Some((until, before)) = self.seen {
+            let Some(passed) = at.checked_duration_since(until) else {
+                return;
+            };
+            let time = Duration::from_micros(passed.as_micros());
+            self.numbers.driven.pass(time, before, now);
+        }
+        self.seen = Some((at, now));
     }
 
     /// The sum of the run, at `now`.
@@ -184,7 +201,6 @@ mod tests {
     use crate::realtime::Scheduling;
     use crate::session::Devices;
     use bridge::calibration::Try;
-    use bridge::clutch::Position;
     use bridge::protocol::message;
     use bridge::telemetry::Counters;
     use std::time::Instant;
@@ -223,6 +239,41 @@ mod tests {
             assert!(told.contains("held for 7.5 s of the 12.0 s"), "{told}");
             assert!(told.contains("fresh frames in a row"), "{told}");
         }
+    }
+
+    #[test]
+    fn a_stop_of_this_program_after_which_a_chip_follows_again_was_held_for_what_its_samples_say() {
+        let hub = Hub::default();
+        let say = |ms| {
+            let now = Snapshot::at(ms, Position::Closed, State::Following);
+            hub.lock().say(now, false);
+        };
+        say(0);
+        say(1_000);
+        // Nobody sends a heartbeat for 800 ms; the samples wait, and are read after the newest status.
+        let lost = State::Holding(HoldReason::HeartbeatLost);
+        let sample = |ms: u64, state| {
+            let sample = Sample {
+                now_us: 1_000 * ms,
+                state,
+                frame_sequence: 1,
+                angles: [0.0; glove::hand::JOINT_COUNT],
+                target: message::PerAxis::new(),
+                command: message::PerAxis::new(),
+                position: message::PerAxis::new(),
+                latency_us: None,
+            };
+            hub.lock().sample(&sample, Position::Closed, |_| false);
+        };
+        for ms in (1_050..=1_800).step_by(50) {
+            sample(ms, if ms < 1_250 { State::Following } else { lost });
+        }
+        say(1_850);
+        // What comes later than something newer tells nothing more.
+        sample(1_840, lost);
+        say(2_000);
+        let summary = hub.summary();
+        assert_eq!((summary.moving_s, summary.held_s), (1.4, 0.6));
     }
 
     #[test]

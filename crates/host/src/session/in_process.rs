@@ -12,7 +12,6 @@ use glove::hand::Side;
 use glove::imu::Mode;
 use gripper::driver::{ThreeFinger, TwoFinger};
 
-use super::Session;
 use super::hub::Hub;
 use super::orders::{Order, Orders};
 use super::record::Feed;
@@ -20,6 +19,7 @@ use super::slots::MemorySlot;
 use super::stopped::Stopped;
 use super::stored::stored;
 use super::worker::{PcApp, Traced, Worker, traced};
+use super::{Session, goes_on};
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
@@ -201,8 +201,7 @@ impl Session for InProcess {
     }
 
     fn running(&self) -> bool {
-        let thread = self.thread.as_ref();
-        thread.is_some_and(|thread| !thread.is_finished())
+        goes_on(self.thread.as_ref())
     }
 
     fn scheduling(&self) -> Option<Scheduling> {

@@ -7,6 +7,8 @@
 //! are refused (the giver tries again with its next heartbeat), and of the state the newest wins. The number of the
 //! gripper's axes is a constant inside the thread and erased here ([`axes::Axes`]).
 
+use std::thread::JoinHandle;
+
 use anyhow::Result;
 use glove::calibration::Bound;
 
@@ -68,8 +70,10 @@ pub trait Session: core::fmt::Debug {
     /// Says what it does; clones watch the same.
     fn hub(&self) -> &Hub;
 
-    /// The ports that this process holds open for it, and what hangs on each.
-    fn ports(&self) -> &[(&'static str, Watch)];
+    /// The ports that this process holds open for it, and what hangs on each: usually none.
+    fn ports(&self) -> &[(&'static str, Watch)] {
+        &[]
+    }
 
     /// Whether it still runs.
     fn running(&self) -> bool;
@@ -84,7 +88,9 @@ pub trait Session: core::fmt::Debug {
     fn ended(&mut self) -> anyhow::Error;
 
     /// How its thread is scheduled; `None` where that is no matter.
-    fn scheduling(&self) -> Option<Scheduling>;
+    fn scheduling(&self) -> Option<Scheduling> {
+        None
+    }
 
     /// The state now; `None` before the bridge first told it.
     fn snapshot(&self) -> Option<Snapshot> {
@@ -100,4 +106,9 @@ pub trait Session: core::fmt::Debug {
     fn set_profile(&self, profile: Option<Bound>) {
         self.orders().set_profile(profile);
     }
+}
+
+/// Whether a session's thread, if it has one, still runs.
+fn goes_on<T>(thread: Option<&JoinHandle<T>>) -> bool {
+    thread.is_some_and(|thread| !thread.is_finished())
 }

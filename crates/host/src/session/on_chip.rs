@@ -10,17 +10,15 @@ use std::thread::JoinHandle;
 use anyhow::Result;
 use bridge::protocol::message::Sample;
 
-use super::Session;
 use super::chip_stop::SAMPLE_MS;
 use super::chip_worker::{Left, Worker};
 use super::hub::Hub;
 use super::orders::{Order, Orders};
 use super::stopped::Stopped;
+use super::{Session, goes_on};
 use crate::chip::link::{Address, Error, HostLink};
 use crate::clock::Clock;
 use crate::failure::OrFail;
-use crate::lines::port::Watch;
-use crate::realtime::Scheduling;
 
 /// A bridge on a chip.
 #[derive(Debug)]
@@ -97,17 +95,8 @@ impl Session for OnChip {
         &self.hub
     }
 
-    fn ports(&self) -> &[(&'static str, Watch)] {
-        &[]
-    }
-
     fn running(&self) -> bool {
-        let thread = self.thread.as_ref();
-        thread.is_some_and(|thread| !thread.is_finished())
-    }
-
-    fn scheduling(&self) -> Option<Scheduling> {
-        None
+        goes_on(self.thread.as_ref())
     }
 
     fn ended(&mut self) -> anyhow::Error {

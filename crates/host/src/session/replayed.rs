@@ -7,15 +7,13 @@ use std::time::{Duration, Instant};
 use anyhow::Result;
 use bridge::{App, Board};
 
-use super::Session;
 use super::hub::Hub;
 use super::orders::{Order, Orders, Queue};
 use super::stopped::Stopped;
 use super::worker::Worker;
+use super::{Session, goes_on};
 use crate::clock::Clock;
 use crate::failure::{Failure, OrFail};
-use crate::lines::port::Watch;
-use crate::realtime::Scheduling;
 use crate::recording::traced::Traced;
 use crate::replay::{self, Follow, Same};
 
@@ -138,17 +136,8 @@ impl Session for Replayed {
         &self.hub
     }
 
-    fn ports(&self) -> &[(&'static str, Watch)] {
-        &[]
-    }
-
     fn running(&self) -> bool {
-        let thread = self.thread.as_ref();
-        thread.is_some_and(|thread| !thread.is_finished())
-    }
-
-    fn scheduling(&self) -> Option<Scheduling> {
-        None
+        goes_on(self.thread.as_ref())
     }
 
     fn ended(&mut self) -> anyhow::Error {

@@ -9,6 +9,7 @@ mod motion;
 
 use crate::chance::Chance;
 use crate::{Duration, Instant};
+pub use motion::FUSION_PERIOD;
 use motion::{gravity_in_sensor, turn_rate};
 
 /// A reset or power-on takes this long; every access gets a NACK meanwhile.
@@ -17,8 +18,6 @@ pub const BOOT: Duration = Duration::from_millis(650);
 pub const LEAVE_CONFIG: Duration = Duration::from_millis(7);
 /// Any mode to CONFIG.
 pub const ENTER_CONFIG: Duration = Duration::from_millis(19);
-/// Period of the fusion output in IMU and NDOF mode.
-pub const FUSION_PERIOD: Duration = Duration::from_millis(10);
 
 /// Quaternion counts of 1.
 const QUATERNION_ONE: f32 = 16_384.0;

@@ -1,6 +1,7 @@
 //! What a test may do to the glove, and what it may look at.
 
 use super::VirtualGlove;
+use super::upset::{Met, Upset, Upsets};
 use crate::clock::lock;
 use crate::{Duration, Instant, PoseSource};
 
@@ -236,5 +237,17 @@ impl VirtualGlove {
         if let Some(chip) = lock(&self.state).bus.sensors.get_mut(index) {
             act(chip);
         }
+    }
+
+    /// Message `number` on the I2C bus goes wrong; they are counted from 0, and [`super::Counters::transactions`] is the number of
+    /// the next. One at a time: another call takes the place of one that has not happened yet.
+    pub fn upset(&self, number: u64, upset: Upset) {
+        lock(&self.state).bus.upsets = Upsets::of(number, upset);
+    }
+
+    /// Whom the upset message was for, if it has come.
+    #[must_use]
+    pub fn upset_met(&self) -> Option<Met> {
+        lock(&self.state).bus.upsets.whom()
     }
 }

@@ -3,7 +3,8 @@
 
 use nalgebra::{Quaternion, Unit, UnitQuaternion, Vector3};
 
-use super::Side;
+use ::glove::hand::Side;
+
 use crate::chance::Chance;
 
 type Rotation = UnitQuaternion<f64>;

@@ -1,8 +1,6 @@
 //! One message on the I2C bus that goes wrong: which one, how, and whom it met.
 
-use super::VirtualGlove;
 use crate::Duration;
-use crate::clock::lock;
 
 /// How long a bridge is mute that an upset makes so.
 pub(super) const MUTE: Duration = Duration::from_millis(4);
@@ -66,6 +64,19 @@ pub(super) struct Upsets {
 }
 
 impl Upsets {
+    /// Message `number` goes wrong so.
+    pub fn of(number: u64, upset: Upset) -> Self {
+        Self {
+            at: Some((number, upset)),
+            met: None,
+        }
+    }
+
+    /// Whom it was for, if it has come.
+    pub fn whom(&self) -> Option<Met> {
+        self.met
+    }
+
     pub fn due(&self, number: u64) -> Option<Upset> {
         self.at
             .filter(|(at, _)| *at == number)
@@ -74,22 +85,5 @@ impl Upsets {
 
     pub fn met(&mut self, met: Met) {
         self.met = Some(met);
-    }
-}
-
-impl VirtualGlove {
-    /// Message `number` on the I2C bus goes wrong; they are counted from 0, and [`super::Counters::transactions`] is the number of
-    /// the next. One at a time: another call takes the place of one that has not happened yet.
-    pub fn upset(&self, number: u64, upset: Upset) {
-        lock(&self.state).bus.upsets = Upsets {
-            at: Some((number, upset)),
-            met: None,
-        };
-    }
-
-    /// Whom the upset message was for, if it has come.
-    #[must_use]
-    pub fn upset_met(&self) -> Option<Met> {
-        lock(&self.state).bus.upsets.met
     }
 }

@@ -1,7 +1,8 @@
 //! How the fingers move.
 
-use super::{Asked, Person, Task};
-use crate::chance::{Chance, knot};
+use super::task::Asked;
+use super::{Person, Task};
+use crate::chance::knot;
 
 /// Which of a finger's five angles are flexions.
 const FLEX: [f64; 5] = [1.0, 0.0, 0.0, 1.0, 1.0];
@@ -10,15 +11,6 @@ const GOES_WITH: f64 = 0.1;
 const TREMOR_HZ: f64 = 9.0;
 /// What is left of wobble and tremor in a hand that lies on a table.
 const ON_TABLE: f64 = 0.15;
-
-/// The middles of a person's free motion, degrees: spread fingers, the little one most.
-pub(super) fn middle(chance: Chance) -> [f64; 25] {
-    let spread = [5.0, 6.0, 0.0, -4.0, -12.0];
-    std::array::from_fn(|j| match j % 5 {
-        1 => spread[j / 5] + 4.0 * chance.even(j as i64),
-        _ => 0.0,
-    })
-}
 
 /// From 0 to 1 and back, `times` in `lasts` seconds; 0 after.
 fn bends(u: f64, lasts: f64, times: f64) -> f64 {

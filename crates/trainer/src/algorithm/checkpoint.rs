@@ -2,6 +2,7 @@
 
 use super::Trainer;
 use crate::data::{Matrix, Pairs, sha256};
+use crate::hexadecimal::hexadecimal;
 use crate::optimizer::Nadam;
 use crate::remedy::Remedy;
 use crate::whole_file;
@@ -91,10 +92,6 @@ fn starts(count: usize) -> String {
 
 pub(super) fn broken(why: impl Into<String>) -> Error {
     Error::Broken { why: why.into() }
-}
-
-pub(super) fn hexadecimal(bytes: &[u8]) -> String {
-    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// Over the words, in the order of their keys, and the arrays with their names and lengths.

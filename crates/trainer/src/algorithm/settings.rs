@@ -1,8 +1,8 @@
 //! What a training is to do.
 
-use super::checkpoint::hexadecimal;
 use crate::cost::{Cost, Lambda};
 use crate::data::{Pairs, sha256};
+use crate::hexadecimal::hexadecimal;
 use crate::network::{HIDDEN, Initialisation};
 use crate::optimizer::LearningRate;
 use sha2::{Digest, Sha256};

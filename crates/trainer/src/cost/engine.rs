@@ -18,14 +18,10 @@ use crate::kernel::lanes::LANES;
 use crate::kernel::{Blocks, Machine, Shape, nadam};
 use crate::optimizer::{LearningRate, Nadam};
 use crate::pool::Pool;
-use cloud::{Cloud, PairPart, QPart, UnitPart, Ways, XPart, ranges};
+use cloud::{Cloud, PARTS, PairPart, QPart, UnitPart, Ways, XPart, ranges};
 use core::time::Duration;
 use pace::Pace;
 use std::time::Instant;
-
-/// Parts of each cloud of samples, and the blocks from which on a part is cut in two.
-const PARTS: usize = 8;
-const LEAST_BLOCKS: usize = 8;
 
 /// The phases of a step; within each the parts are worked on in parallel.
 pub(crate) const PHASES: [&str; 6] = [

@@ -2,6 +2,7 @@
 //! byte the same for the same model.
 
 use super::{Error, Metadata, Model, Normalisation};
+use crate::hexadecimal::hexadecimal;
 use crate::network::Network;
 use crate::whole_file;
 use safetensors::{Dtype, SafeTensors};
@@ -114,7 +115,7 @@ impl Model {
             let bytes: Vec<u8> = values.iter().flat_map(|v| v.to_le_bytes()).collect();
             digest_tensor(&mut hash, &name, &shape, &bytes);
         }
-        hexadecimal(hash)
+        hexadecimal(&hash.finalize())
     }
 
     /// Compares the digests in the metadata with what is there, and takes them out. A file of an earlier version has none; where the
@@ -229,14 +230,7 @@ fn metadata_sha256(metadata: &Metadata) -> String {
             hash.update([0]);
         }
     }
-    hexadecimal(hash)
-}
-
-fn hexadecimal(hash: Sha256) -> String {
-    hash.finalize()
-        .iter()
-        .map(|byte| format!("{byte:02x}"))
-        .collect()
+    hexadecimal(&hash.finalize())
 }
 
 /// The tensors of a model file.

@@ -1,12 +1,9 @@
 //! The line to a bridge: a serial port, or a socket where the bridge runs in an emulator.
 
-use std::fmt;
 use std::io;
 use std::net::{TcpStream, ToSocketAddrs};
 use std::os::fd::OwnedFd;
 use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
-use std::str::FromStr;
 use std::sync::Arc;
 use std::sync::mpsc::channel;
 use std::time::{Duration, Instant};
@@ -17,60 +14,13 @@ use rustix::io::Errno;
 
 use bridge::trace::{Entry, HOST, Note as _};
 
-use super::{Error, HostLink};
+use super::{Address, Error};
 use crate::clock::Clock;
 use crate::lines::port::{BAUD, Port};
 use crate::trace::TraceLog;
 
 /// A socket must be connected by then.
 const CONNECT_WAIT: Duration = Duration::from_secs(3);
-
-/// Where a bridge is reached.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Address {
-    /// A serial port, at 115200 baud.
-    Serial(PathBuf),
-    /// `unix:PATH`, a socket in the file system.
-    Unix(PathBuf),
-    /// `tcp:HOST:PORT`.
-    Tcp(String),
-}
-
-impl FromStr for Address {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        if let Some(path) = text.strip_prefix("unix:") {
-            return match path {
-                "" => Err("unix: needs a path, as in unix:/tmp/host.sock".to_owned()),
-                path => Ok(Self::Unix(path.into())),
-            };
-        }
-        if let Some(peer) = text.strip_prefix("tcp:") {
-            let port = peer.rsplit_once(':').map(|(_, port)| port.parse::<u16>());
-            return match port {
-                Some(Ok(_)) => Ok(Self::Tcp(peer.to_owned())),
-                _ => Err(format!(
-                    "tcp:{peer} names no port number, as in tcp:localhost:4000"
-                )),
-            };
-        }
-        match text {
-            "" => Err("a port's name is empty".to_owned()),
-            path => Ok(Self::Serial(path.into())),
-        }
-    }
-}
-
-impl fmt::Display for Address {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Serial(path) => path.display().fmt(f),
-            Self::Unix(path) => write!(f, "unix:{}", path.display()),
-            Self::Tcp(peer) => write!(f, "tcp:{peer}"),
-        }
-    }
-}
 
 /// Where what goes over a line is written down, and by which clock.
 #[derive(Debug, Clone, Default)]
@@ -80,20 +30,16 @@ pub(super) struct Kept {
 }
 
 impl Kept {
+    pub(super) fn new(trace: TraceLog, clock: Clock) -> Self {
+        let clock = Some(clock);
+        Self { trace, clock }
+    }
+
     fn note(&self, entry: &Entry<'_>) {
         if let Some(clock) = &self.clock {
             self.trace.clock(clock.now());
             self.trace.note(entry);
         }
-    }
-}
-
-impl HostLink {
-    /// Writes down from now on what goes over the line: what the bridge tells and what it is told.
-    pub fn keep(&mut self, trace: TraceLog, clock: Clock) {
-        let clock = Some(clock);
-        self.kept = Kept { trace, clock };
-        self.line = self.line.take().map(|line| line.kept(&self.kept));
     }
 }
 
@@ -232,19 +178,4 @@ fn in_time<T: Send + 'static>(
         })?;
     take.recv_timeout(CONNECT_WAIT)
         .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn addresses_are_read_as_they_are_printed_and_broken_ones_refused() {
-        for text in ["/dev/ttyUSB0", "unix:/tmp/host.sock", "tcp:[::1]:4000"] {
-            assert_eq!(text.parse::<Address>().unwrap().to_string(), text);
-        }
-        for text in ["", "unix:", "tcp:localhost", "tcp:localhost:http"] {
-            assert!(text.parse::<Address>().is_err(), "{text}");
-        }
-    }
 }

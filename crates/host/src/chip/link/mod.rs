@@ -4,9 +4,11 @@
 //! twice; after [`ATTEMPTS`] the bridge counts as silent. Every frame starts with a zero, which ends whatever noise came
 //! before it. [`flash`](HostLink::flash) opens a broken line again and goes on where the bridge says it was.
 
+mod address;
 mod clutch;
 mod error;
 mod flash;
+mod hello;
 mod line;
 mod profile;
 #[cfg(test)]
@@ -18,14 +20,13 @@ use std::time::{Duration, Instant};
 use bridge::Epoch;
 use bridge::protocol::frame::{self, Decoder};
 use bridge::protocol::message::{
-    Answer, Call, Counters, FromBridge, Health, Hello, OLDEST_ASKED, Refusal, Reply, Request,
-    Sample, Scan, Slots, Status, VERSION,
+    Answer, Call, Counters, FromBridge, Health, Hello, Reply, Request, Sample, Scan, Slots, Status,
 };
 
+pub use address::Address;
 pub use clutch::Heartbeat;
 pub use error::{Error, Heard, refusal_next, refusal_words};
 pub use flash::Flashed;
-pub use line::Address;
 use line::{Kept, Line};
 
 /// Times a request is sent before the bridge counts as silent.
@@ -44,9 +45,6 @@ const ACT_WAITS: [Duration; 3] = [
 const CHUNK_WAIT: Duration = Duration::from_secs(1);
 /// For a reply to what erases or checks flash; an erase block of a real chip takes up to 2 s.
 const FLASH_WAIT: Duration = Duration::from_secs(3);
-/// A session that another host let go of ends after 2 s.
-const BUSY_WAIT: Duration = Duration::from_millis(2_500);
-const BUSY_PAUSE: Duration = Duration::from_millis(250);
 /// Samples kept until somebody takes them; older ones go first.
 const SAMPLES: usize = 256;
 
@@ -94,70 +92,6 @@ impl HostLink {
         };
         link.reconnect()?;
         Ok(link)
-    }
-
-    /// Opens the line again and goes on with the same session.
-    ///
-    /// # Errors
-    /// As [`HostLink::connect`].
-    pub fn reconnect(&mut self) -> Result<(), Error> {
-        // The old line goes first: a serial port is open once only.
-        self.line = None;
-        self.decoder = Decoder::new();
-        self.line = Some(Line::open(&self.address)?.kept(&self.kept));
-        let patience = Instant::now() + BUSY_WAIT;
-        loop {
-            match self.say_hello() {
-                Err(Error::Refused(Refusal::Busy { .. })) if Instant::now() < patience => {
-                    std::thread::sleep(BUSY_PAUSE);
-                }
-                result => return result,
-            }
-        }
-    }
-
-    fn say_hello(&mut self) -> Result<(), Error> {
-        let answer = match self.call(&Call::Hello { version: VERSION }) {
-            // An older bridge can be asked and flashed; its clutch is not for this tool.
-            Err(Error::Refused(Refusal::Version { bridge }))
-                if (OLDEST_ASKED..VERSION).contains(&bridge) =>
-            {
-                self.call(&Call::Hello { version: bridge })?
-            }
-            answer => answer?,
-        };
-        match answer {
-            Answer::Hello(hello) => {
-                self.hello = Some(hello);
-                Ok(())
-            }
-            other => Err(confused(&other)),
-        }
-    }
-
-    /// Begins the session anew on the same line: the bridge ended it, since it heard nothing for 2 s. Its telemetry is off then,
-    /// and no clutch is kept.
-    ///
-    /// # Errors
-    /// As [`HostLink::call`].
-    pub fn renew(&mut self) -> Result<(), Error> {
-        self.say_hello()
-    }
-
-    /// Fails where the bridge speaks an older version, which lacks what is asked for.
-    fn require_own_version(&self, what: &'static str) -> Result<(), Error> {
-        match self.hello {
-            Some(hello) if hello.version < VERSION => Err(Error::Older {
-                what,
-                bridge: hello.version,
-            }),
-            _ => Ok(()),
-        }
-    }
-
-    /// What the bridge is.
-    pub fn hello(&self) -> Option<Hello> {
-        self.hello
     }
 
     /// Where it is.

@@ -5,7 +5,7 @@ use std::os::unix::net::{UnixListener, UnixStream};
 use std::path::Path;
 use std::thread::JoinHandle;
 
-use bridge::protocol::message::Hello;
+use bridge::protocol::message::{Hello, Refusal, VERSION};
 
 use super::*;
 use crate::failure::Failure;

@@ -1,6 +1,9 @@
 //! What a sensor feels of its motion.
 
-use super::FUSION_PERIOD;
+use crate::Duration;
+
+/// Period of the fusion output in IMU and NDOF mode.
+pub const FUSION_PERIOD: Duration = Duration::from_millis(10);
 
 /// Body rates in rad/s from two orientations one fusion period apart.
 pub(super) fn turn_rate(before: [f32; 4], after: [f32; 4]) -> [f32; 3] {

@@ -1,7 +1,7 @@
 //! One of the starts: trained, judged, given what a person has shown.
 
-use super::{Judge, Settings};
-use crate::algorithm::{Advance, Error, Trainer};
+use super::Judge;
+use crate::algorithm::{Advance, Error, Settings, Trainer};
 use crate::cost::{Weights, fast};
 use crate::data::{Matrix, Pairs};
 

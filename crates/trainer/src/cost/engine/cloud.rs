@@ -1,6 +1,5 @@
 //! The parts that the samples are cut into, each with the room it works in.
 
-use super::{LEAST_BLOCKS, PARTS};
 use crate::data::Matrix;
 use crate::kernel::affine::Trace;
 use crate::kernel::boxes::{Boxes, MOST_DIMS};
@@ -10,6 +9,10 @@ use crate::kernel::tracker::Tracker;
 use crate::kernel::tree::{Tree, halves};
 use crate::kernel::{Blocks, Shape};
 use core::ops::Range;
+
+/// Parts of each cloud of samples, and the blocks from which on a part is cut in two.
+pub(super) const PARTS: usize = 8;
+const LEAST_BLOCKS: usize = 8;
 
 /// A fixed cloud of samples, near ones near in order.
 pub(super) struct Cloud {
