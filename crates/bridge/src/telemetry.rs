@@ -9,6 +9,9 @@ use glove::headings::PoseReport;
 use glove::scan::{self, Frame};
 use gripper::{Motion, Status};
 
+/// All joints, as a bit mask.
+pub const ALL_JOINTS: u32 = (1 << JOINT_COUNT) - 1;
+
 /// A snapshot after one step of the loop. `X` is the gripper's number of axes.
 ///
 /// A step takes at most one frame, sends at most one command and takes at most one status. Whoever looks after every step
@@ -42,9 +45,12 @@ pub struct Telemetry<const X: usize> {
     pub frame_sequence: u32,
     /// The newest frame, by segment: each sample where its sensor sits.
     pub frame: Option<Frame>,
-    /// Joint angles of the newest frame that gave any, radians; joints beside a lost sensor repeat their last good angle.
+    /// Joint angles of the newest frame that gave any, radians; joints beside a lost sensor repeat their last good angle. Of a
+    /// glove that is not calibrated those of sensors that sit straight, which no hand may have.
     pub angles: [f32; JOINT_COUNT],
-    /// Whether the newest frame gave angles.
+    /// Whether the newest frame gave angles, of whatever worth.
+    pub gives_angles: bool,
+    /// Whether they are the hand's: the newest frame gave them, and the glove is calibrated.
     pub angles_valid: bool,
     /// Segments without a usable sample in the newest frame (bit k: segment k).
     pub missing: u16,
@@ -147,6 +153,7 @@ impl<const X: usize> Telemetry<X> {
             frame_sequence: 0,
             frame: None,
             angles: [0.0; JOINT_COUNT],
+            gives_angles: false,
             angles_valid: false,
             missing: 0,
             distrusted: 0,
@@ -168,6 +175,15 @@ impl<const X: usize> Telemetry<X> {
         }
     }
 
+    /// Joints that the newest frame does not show (bit j: joint j): those that repeat an old angle; all, where its angles are not
+    /// the hand's.
+    pub fn not_shown(&self) -> u32 {
+        match self.angles_valid {
+            true => self.held_joints,
+            false => ALL_JOINTS,
+        }
+    }
+
     /// What the glove lacks, if it is not calibrated.
     pub fn lacks(&self) -> Option<Lack> {
         (!self.calibration.is_calibrated).then(|| self.profile.lacks())
@@ -180,7 +196,8 @@ impl<const X: usize> Telemetry<X> {
 
     /// Another profile: what was known by the old one counts for nothing.
     pub(crate) fn forget_glove(&mut self) {
-        (self.frame, self.angles_valid, self.pose) = (None, false, None);
+        (self.frame, self.pose) = (None, None);
+        (self.gives_angles, self.angles_valid) = (false, false);
         (self.sigma, self.drift) = ([0.0; SEGMENT_COUNT], [0.0; SEGMENT_COUNT]);
         (self.degraded, self.unknown) = (0, 0);
     }
@@ -191,8 +208,10 @@ impl<const X: usize> Telemetry<X> {
         self.missing = posture::missing(frame);
     }
 
-    pub(crate) fn take_reading(&mut self, reading: &Result<Reading, HoldReason>) {
-        self.angles_valid = reading.is_ok();
+    /// `calibrated`: what the angles rest on is there.
+    pub(crate) fn take_reading(&mut self, reading: &Result<Reading, HoldReason>, calibrated: bool) {
+        self.gives_angles = reading.is_ok();
+        self.angles_valid = self.gives_angles && calibrated;
         match reading {
             Ok(reading) => {
                 self.angles = reading.angles;

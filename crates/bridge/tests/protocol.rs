@@ -4,10 +4,11 @@ mod common;
 
 use bridge::calibration::{Refusal as NotTaken, Try};
 use bridge::protocol::message::{
-    Answer, CHUNK, Call, Devices, FromBridge, Refusal, SensorIds, SlotContents, UnusedSensor,
-    VERSION, WeightsKind,
+    Answer, CHUNK, Call, Devices, FromBridge, Refusal, Sample, SensorIds, SlotContents,
+    UnusedSensor, VERSION, WeightsKind,
 };
 use bridge::protocol::{Outcome, frame};
+use bridge::telemetry::ALL_JOINTS;
 use bridge::{Settings, State, store};
 use common::bench::{Bench, MS, S};
 use common::host::{Host, crc32, framed};
@@ -275,6 +276,46 @@ fn telemetry_comes_at_its_period_until_it_is_turned_off() {
     host.ask(Call::Telemetry { period_ms: 0 }).unwrap();
     host.run(500 * MS);
     assert_eq!(host.hear(), None);
+}
+
+/// The newest telemetry sample of the next 300 ms.
+fn sample(host: &mut Host) -> Sample {
+    host.ask(Call::Telemetry { period_ms: 50 }).unwrap();
+    host.run(300 * MS);
+    let mut newest = None;
+    while let Some(message) = host.hear() {
+        if let FromBridge::Sample(sample) = message {
+            newest = Some(sample);
+        }
+    }
+    newest.expect("a sample")
+}
+
+#[test]
+fn a_sample_says_whether_its_angles_are_a_calibrated_hands_and_which_of_them_are_old() {
+    let mut host = without_weights();
+    host.run(3 * S);
+    let mut host = host.hello();
+    let uncalibrated = sample(&mut host);
+    let telemetry = host.bench.app.telemetry();
+    assert!(telemetry.frame_sequence > 0 && telemetry.gives_angles);
+    assert!(!telemetry.angles_valid && !telemetry.calibration.is_calibrated);
+    assert_eq!(uncalibrated.not_shown, Some(ALL_JOINTS));
+    let mut host = following();
+    assert_eq!(sample(&mut host).not_shown, Some(0));
+    host.bench.glove.unplug(7, true);
+    host.run(500 * MS);
+    let held = glove::hand::joints_of_segment(7);
+    let beside_a_lost_sensor = sample(&mut host);
+    assert_eq!(beside_a_lost_sensor.not_shown, Some(held));
+    assert_eq!(beside_a_lost_sensor.is_valid(), Some(true));
+    assert_eq!(beside_a_lost_sensor.is_whole(), Some(false));
+    // Its heading is another: nothing is known of the hand.
+    host.bench
+        .glove
+        .set_heading(0, core::f32::consts::FRAC_PI_2);
+    host.run(S);
+    assert_eq!(sample(&mut host).not_shown, Some(ALL_JOINTS));
 }
 
 fn devices(host: &mut Host) -> Devices {

@@ -393,6 +393,7 @@ fn samples() -> Vec<Sample> {
         command: [1, 2, 3, 4].into_iter().collect(),
         position: [5, 6, 7, 8].into_iter().collect(),
         latency_us: Some(4_321),
+        not_shown: None,
     };
     let empty = Sample {
         target: Default::default(),
@@ -538,7 +539,20 @@ fn lines() -> Vec<String> {
     text.extend(profile_refusals().map(|why| line(&reply(Err(Refusal::Profile(why))))));
     text.push(line(&FromBridge::Scan(scan())));
     text.push(line(&reply(Ok(not_taken(NotTaken::HasProfile)))));
+    text.extend(shown_samples().iter().map(line));
     text
+}
+
+/// Samples that say which joints their frame does not show, which those of earlier bridges did not.
+fn shown_samples() -> Vec<FromBridge> {
+    let shown = |(sample, joints)| Sample {
+        not_shown: Some(joints),
+        ..sample
+    };
+    let [empty, full] = [0, 5].map(|at| samples().swap_remove(at));
+    [(empty, 0x01FF_FFFF), (full.clone(), 0), (full, 0x0180_0001)]
+        .map(|sample| FromBridge::Sample(shown(sample)))
+        .into()
 }
 
 fn not_taken(why: NotTaken) -> Answer {
@@ -703,6 +717,36 @@ fn reply(answer: Result<Answer, Refusal>) -> FromBridge {
         sequence: 2,
         answer,
     })
+}
+
+#[test]
+fn a_sample_is_read_with_and_without_the_joints_that_it_does_not_show() {
+    /// As a host of before that field reads it.
+    #[derive(serde::Deserialize)]
+    struct Before {
+        variant: u8,
+        now_us: u64,
+    }
+    for sample in shown_samples() {
+        let mut room = [0; frame::MAX_MESSAGE];
+        let bytes = postcard::to_slice(&sample, &mut room).expect("room");
+        let before: Before =
+            postcard::from_bytes(bytes).expect("what is behind it is not looked at");
+        assert_eq!((before.variant, before.now_us), (1, 1_000_000));
+        let FromBridge::Sample(sample) = sample else {
+            unreachable!()
+        };
+        let old = FromBridge::Sample(Sample {
+            not_shown: None,
+            ..sample.clone()
+        });
+        let cut = postcard::to_slice(&old, &mut room).expect("room").len();
+        let read = postcard::from_bytes::<FromBridge>(&room[..cut]);
+        assert_eq!(read, Ok(old), "a bridge from before it");
+        assert_eq!(sample.is_whole(), Some(sample.not_shown == Some(0)));
+        let all = sample.not_shown == Some(bridge::telemetry::ALL_JOINTS);
+        assert_eq!(sample.is_valid(), Some(!all));
+    }
 }
 
 #[test]

@@ -228,6 +228,7 @@ fn results_of_runs_keep_their_names() {
             path: path("hand.csv"),
             rows: 400,
         }),
+        passed_over: Some(3),
         failure: Some(Told::of(&error)),
     };
     let demo = runs::Demo {

@@ -6,7 +6,8 @@
 //! by one and keeps sums only. `docs/hand-model.md` has the formulas.
 //!
 //! Order of the steps: the turn after a flat pose, the bending after the turn. A step begun again is measured anew; a turn begun
-//! again takes the bending with it, which rests on its headings.
+//! again takes the bending with it, which rests on its headings, and of a sensor that started anew since a flat pose what that pose
+//! showed of it.
 
 use crate::hand::{self, Quaternion, SEGMENT_COUNT, Side};
 use algebra::Half;
@@ -172,6 +173,7 @@ impl Session {
                 let flat = self.flats.iter().find_map(|flat| flat.mean(0));
                 self.turn = Turn::new(flat);
                 self.headings = None;
+                self.drop_flats_of_restarted();
                 (self.paths, self.seats) = (Paths::new(), AS_WIRED);
                 self.alone = [Moments::new(); SEGMENT_COUNT];
                 self.together = [[Moments::new(); SEGMENT_COUNT]; 3];
@@ -186,6 +188,20 @@ impl Session {
             Step::Fists => self.together[FISTS] = [Moments::new(); SEGMENT_COUNT],
             Step::Thumb => self.together[THUMB] = [Moments::new(); SEGMENT_COUNT],
             Step::Free => self.together[FREE] = [Moments::new(); SEGMENT_COUNT],
+        }
+    }
+
+    /// The turn shows the headings that sensors have now: what flat poses say of those that started anew since is of another one.
+    fn drop_flats_of_restarted(&mut self) {
+        let restarted = core::mem::take(&mut self.restarted);
+        for k in (0..SEGMENT_COUNT).filter(|k| restarted >> k & 1 == 1) {
+            for flat in &mut self.flats {
+                if usize::from(self.seats[0]) == k {
+                    // All mountings are against the hand's.
+                    *flat = Flat::new();
+                }
+                flat.forget(k);
+            }
         }
     }
 
@@ -211,7 +227,8 @@ impl Session {
     }
 
     /// A sensor started anew (as it is wired). Once there are its heading by the turn and two flat poses it is left out of the bending,
-    /// and the last flat pose gives the new heading; before, and during that pose, the session is spoiled.
+    /// and the last flat pose gives the new heading, or the turn where that is done again; before, and during that pose, the session
+    /// is spoiled.
     pub fn restarted(&mut self, sensor: usize) {
         let bit = 1u16.checked_shl(sensor as u32).unwrap_or(0);
         let measured = self.headings.is_some() && self.flats_made & 0b11 == 0b11;

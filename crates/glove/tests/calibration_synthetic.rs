@@ -3,8 +3,8 @@
 mod synthetic;
 
 use glove::Instant;
-use glove::calibration::{Align, Doubt, Identity, Outcome, Reads, Session, Step, Verdict};
-use glove::hand::{JOINT_COUNT, SEGMENT_COUNT, Side};
+use glove::calibration::{Align, Aligned, Doubt, Identity, Outcome, Reads, Session, Step, Verdict};
+use glove::hand::{JOINT_COUNT, Quaternion, SEGMENT_COUNT, Side};
 use glove::headings::{Config, Headings, Reading};
 use synthetic::{FLAT_IN_USE, Person, Restart, Scan, USE_FROM};
 
@@ -485,6 +485,73 @@ fn a_sensor_that_restarts_before_its_heading_is_known_spoils_the_session() {
         };
         assert!(run.outcome.checks.doubts().any(|d| d == named), "at {at} s");
         assert_eq!(run.outcome.checks.verdict(6), Verdict::Bad);
+    }
+}
+
+/// The scans of a session, each with its step.
+fn steps_of(person: &Person) -> Vec<(Option<Step>, Aligned)> {
+    let mut way = Way::new();
+    let mut steps = Vec::new();
+    for scan in synthetic::session(person) {
+        if scan.step.is_none() && matches!(steps.last(), Some((Some(Step::LastFlat), _))) {
+            break;
+        }
+        let (aligned, _) = way.take(&scan);
+        steps.push((scan.step, aligned));
+    }
+    steps
+}
+
+fn feed<'a>(session: &mut Session, scans: impl Iterator<Item = &'a (Option<Step>, Aligned)>) {
+    for (step, aligned) in scans {
+        if *step != session.step() {
+            match step {
+                Some(step) => session.begin(*step),
+                None => session.end(),
+            }
+        }
+        session.take(aligned);
+    }
+}
+
+#[test]
+fn a_turn_done_again_after_a_sensor_restarted_gives_the_mountings_of_a_session_without_that() {
+    let person = Person::exact(1300);
+    let scans = steps_of(&person);
+    let mut undisturbed = Session::new();
+    feed(&mut undisturbed, scans.iter());
+    let truth = undisturbed.finish().expect("an outcome").profile;
+    for sensor in [6, 7, 2, 0] {
+        let mut session = Session::new();
+        let before_last = |scan: &&(Option<Step>, Aligned)| scan.0 != Some(Step::LastFlat);
+        feed(&mut session, scans.iter().filter(before_last));
+        session.end();
+        session.restarted(sensor);
+        // From the turn on once more, with that sensor's new heading.
+        let again = scans.iter().skip_while(|scan| scan.0 != Some(Step::Turn));
+        let about_up = Quaternion::from_axis_angle(&nalgebra::Vector3::z_axis(), 1.5);
+        let jumped: Vec<_> = again
+            .map(|(step, aligned)| {
+                let mut aligned = *aligned;
+                let q = &mut aligned.orientations[sensor];
+                *q = about_up * *q;
+                (*step, aligned)
+            })
+            .collect();
+        feed(&mut session, jumped.iter());
+        let outcome = session.finish().expect("an outcome");
+        for (k, (is, was)) in outcome
+            .profile
+            .mounting
+            .iter()
+            .zip(truth.mounting)
+            .enumerate()
+        {
+            let off = is.angle_to(&was).to_degrees();
+            assert!(off < 2.0, "sensor {sensor}, segment {k}: {off}°");
+        }
+        let doubts: Vec<_> = outcome.checks.doubts().collect();
+        assert_eq!(doubts, [], "sensor {sensor}");
     }
 }
 

@@ -5,8 +5,9 @@
 use std::sync::{Arc, Mutex};
 
 use glove::Instant;
-use glove::calibration::{Doubt, Finger, Reads, Step, Verdict};
+use glove::calibration::{Align, Doubt, Finger, Reads, Step, Verdict};
 use glove::hand::{SEGMENT_NAMES, Side};
+use glove::headings::{Config, Headings};
 use glove::scan::Frame;
 use host::calibration::guide::{Again, FlatPose, Guide, News, PoseEnd, Remark, Stage, slipped};
 use rig::PoseSource;
@@ -446,6 +447,92 @@ fn a_sensor_that_starts_anew_is_told_at_once_and_costs_what_it_must() {
         assert_eq!(bench.judged().verdict(), verdict, "{found:?}");
         assert_eq!(bench.judged().again(), again);
     }
+}
+
+/// How far the joints are off the person's while the hand is used for 8 s after the session, root mean square, degrees: the worst of
+/// all joints.
+fn worst_joint_in_use(bench: &mut Bench) -> f32 {
+    let outcome = bench.judged().outcome;
+    let config = Config {
+        finds_flat: false,
+        ..Config::default()
+    };
+    let mut headings = Headings::start(&outcome, instant(bench.now()), config);
+    let mut align = Align::new();
+    bench.ask_person(Task::Use(Attitude::Free));
+    let (mut sums, mut n) = ([0.0f64; 25], 0.0);
+    for scan in 0..(11.0 * RATE) as u32 {
+        let at = bench.now();
+        let frame = bench.frame().unwrap();
+        let reading = headings.take(&align.take(&frame));
+        if scan < (3.0 * RATE) as u32 {
+            continue;
+        }
+        assert_eq!(reading.held, 0);
+        // The chips are some 5 ms behind.
+        let truth = bench.person.0.lock().unwrap().angles(at - 0.005);
+        for (sum, (angle, truth)) in sums.iter_mut().zip(reading.angles.iter().zip(truth)) {
+            *sum += (f64::from(*angle) - truth).to_degrees().powi(2);
+        }
+        n += 1.0;
+    }
+    sums.iter()
+        .fold(0.0, |worst: f64, sum| worst.max((sum / n).sqrt())) as f32
+}
+
+#[test]
+fn after_a_sensor_started_anew_a_turn_done_again_gives_the_true_mountings() {
+    let exact = |turns: f64| Traits {
+        turns,
+        unstraight: 0.0,
+        thumb_off: 0.0,
+        table: 0.0,
+        ..traits(21)
+    };
+    let mut worst = Vec::new();
+    for sensor in [None, Some(9), Some(7), Some(2), Some(0)] {
+        let mut bench = Bench::new(exact(0.12), honest(21), None);
+        if let Some(sensor) = sensor {
+            let restart = move |glove: &VirtualGlove, now: Instant| {
+                glove.reset_sensor(sensor, now);
+                glove.bring_up(sensor, now + glove::Duration::from_ticks(700_000));
+            };
+            bench.on.push((Step::Free, Box::new(restart)));
+        }
+        bench.run();
+        assert_eq!(bench.judged().again(), Some(Again::Turn), "{sensor:?}");
+        *bench.person.0.lock().unwrap() = Person::new(exact(1.0));
+        bench.ask_person(Task::Flat);
+        bench.guide.again(instant(bench.now()));
+        bench.run();
+        assert_eq!(bench.told(), Vec::<String>::new(), "{sensor:?}");
+        worst.push((sensor, worst_joint_in_use(&mut bench)));
+    }
+    println!("{worst:.1?}");
+    let (_, without) = worst[0];
+    for (sensor, off) in &worst {
+        assert!(*off < 6.0, "{worst:.1?}");
+        assert!(*off < without + 2.0, "{sensor:?}: {worst:.1?}");
+    }
+}
+
+#[test]
+fn what_is_left_of_the_bending_after_a_sensor_started_anew_begins_with_the_turn() {
+    let mut bench = Bench::of(22);
+    let restart = |glove: &VirtualGlove, now: Instant| {
+        glove.reset_sensor(6, now);
+        glove.bring_up(6, now + glove::Duration::from_ticks(700_000));
+    };
+    bench
+        .on
+        .push((Step::Alone(Finger::Index), Box::new(restart)));
+    bench.run();
+    let judged = bench.judged();
+    assert!(judged.outcome.checks.restarted != 0);
+    assert_eq!(judged.again(), Some(Again::Turn), "{:?}", bench.told());
+    bench.guide.again(instant(bench.now()));
+    bench.run();
+    assert_eq!(bench.told(), Vec::<String>::new());
 }
 
 #[test]

@@ -77,13 +77,14 @@ impl<B: Board<X>, const X: usize> App<B, X> {
         }
         self.watch_headings(now, reading.ok().and_then(|reading| reading.pose));
         self.tell_impossible(now);
-        self.telemetry.take_reading(&reading);
+        let calibrated = self.posture.is_calibrated();
+        self.telemetry.take_reading(&reading, calibrated);
         let output = reading.and_then(|reading| {
             let map = self
                 .store
                 .map::<JOINT_COUNT, HIDDEN, X>()
                 .ok_or(HoldReason::NoWeights)?;
-            if !self.posture.is_calibrated() {
+            if !calibrated {
                 return Err(HoldReason::NotCalibrated);
             }
             map.eval(&reading.angles)

@@ -8,7 +8,7 @@ use super::wire;
 use crate::clutch::{Epoch, HeartbeatRefusal};
 use crate::config::SafeAction;
 use crate::{State, filter, store};
-use glove::hand::{JOINT_COUNT, Side};
+use glove::hand::Side;
 use gripper::{Activation, registers::Fault};
 use hae::image::Element;
 use heapless::Vec;
@@ -17,11 +17,13 @@ use serde::{Deserialize, Serialize};
 mod counters;
 mod devices;
 mod health;
+mod sample;
 mod worn;
 
 pub use counters::Counters;
 pub use devices::{AxisDetail, CAUSES, Devices, GripperDetail, Replies, UnusedSensor};
 pub use health::{Health, Restart};
+pub use sample::Sample;
 pub use worn::{Headings, PROFILE_CHUNK, ProfilePart, STAMP_US, Scan, SensorIds};
 
 /// Version of the protocol. A bridge refuses a host of another version at hello.
@@ -328,28 +330,6 @@ impl From<Element> for WeightsKind {
             _ => Self::Other,
         }
     }
-}
-
-/// What is now.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Sample {
-    /// Microseconds since the bridge started.
-    pub now_us: u64,
-    /// The supervisor's state.
-    #[serde(with = "wire::WireState")]
-    pub state: State,
-    /// Frames taken so far.
-    pub frame_sequence: u32,
-    /// Joint angles, radians.
-    pub angles: [f32; JOINT_COUNT],
-    /// Where the hand wants the gripper, counts; empty without.
-    pub target: PerAxis<f32>,
-    /// What the gripper is told, counts; empty when it is only read.
-    pub command: PerAxis<u8>,
-    /// Where the gripper is, counts; empty when it does not answer.
-    pub position: PerAxis<u8>,
-    /// From the oldest sample used to the command's leaving, microseconds.
-    pub latency_us: Option<u32>,
 }
 
 /// What a person may set, as [`crate::Settings`].

@@ -54,6 +54,7 @@ impl<S> Server<S> {
             latency_us: seen
                 .latency
                 .map(|latency| latency.as_micros().min(u64::from(u32::MAX)) as u32),
+            not_shown: Some(seen.not_shown()),
         }));
     }
 

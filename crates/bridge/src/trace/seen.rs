@@ -77,7 +77,7 @@ fn digest<const X: usize>(telemetry: &Telemetry<X>) -> u32 {
     let _ = write!(sum, "{:?}", telemetry.state);
     let mut sum = sum.0;
     sum.update(&telemetry.frame_sequence.to_le_bytes());
-    sum.update(&[u8::from(telemetry.angles_valid)]);
+    sum.update(&[u8::from(telemetry.gives_angles)]);
     for values in [Some(&telemetry.angles[..])].into_iter().chain(
         [&telemetry.map_output, &telemetry.target].map(|axes| axes.as_ref().map(|axes| &axes[..])),
     ) {

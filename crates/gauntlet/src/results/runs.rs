@@ -30,6 +30,8 @@ pub struct Run<'a> {
     pub log: Option<&'a Written>,
     /// The poses file of `bridge log`.
     pub poses: Option<Poses<'a>>,
+    /// Scans that are no row of it, since a joint was not measured or the glove is not calibrated; `null` but of `bridge log`.
+    pub passed_over: Option<u64>,
     /// Why it failed; `null` where it did not.
     pub failure: Option<Told>,
 }

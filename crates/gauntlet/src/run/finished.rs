@@ -48,6 +48,7 @@ impl Finished {
                 .map(joints),
             log: self.log.as_ref(),
             poses: None,
+            passed_over: None,
             failure,
         }
     }

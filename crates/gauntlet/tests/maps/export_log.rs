@@ -37,6 +37,7 @@ fn log(folder: &Path, side: Side) -> PathBuf {
             imus: [imu; SEGMENT_COUNT],
             angles: generator.pose_at(0.108 * row as f64),
             angles_valid: row % 10 != 9,
+            held_joints: 0,
             map_output: None,
             following: false,
             headings: None,

@@ -237,6 +237,26 @@ fn a_bridge_is_given_only_the_profile_of_its_own_sensors_shows_it_and_forgets_it
     assert!(text(&shown.stdout).contains("profile    none is kept"));
 }
 
+#[test]
+fn the_hand_of_a_glove_that_is_not_calibrated_is_not_written_down() {
+    let folder = tempfile::tempdir().unwrap();
+    let chip = Mutex::new(Chip::default());
+    let listener = UnixListener::bind(folder.path().join("bridge")).unwrap();
+    std::thread::spawn(move || {
+        let streams = listener.incoming().flatten();
+        streams.for_each(|stream| serve(&chip, stream));
+    });
+    let file = folder.path().join("hand.csv");
+    let refused = bridge(
+        folder.path(),
+        &["log", "--out", path(&file), "--seconds", "1"],
+    );
+    assert!(refusal(&refused, 1).contains("is not calibrated"));
+    let next = "gauntlet bridge calibrate --bridge unix:";
+    assert!(text(&refused.stderr).contains(next));
+    assert!(!file.exists());
+}
+
 fn path(path: &Path) -> &str {
     path.to_str().unwrap()
 }

@@ -14,4 +14,5 @@ mod ports;
 mod sensors;
 mod simulated_glove;
 mod situations;
+mod uncalibrated;
 mod wrong_settings;

@@ -3,7 +3,7 @@
 use super::joint::Kind;
 use crate::calibration::algebra::{self, Half, rad};
 use crate::hand::{self, JOINT_COUNT, Quaternion, SEGMENT_COUNT};
-use crate::timing::since;
+use crate::timing::{STILL_GAP, since};
 use crate::{Duration, Instant};
 
 /// A flat pose needs this many scans of a sensor.
@@ -127,6 +127,8 @@ pub(super) struct Finder {
     since: Option<Instant>,
     /// What it is compared with, and since when.
     still: ([f32; JOINT_COUNT], Instant),
+    /// When the newest scan was made.
+    last: Option<Instant>,
     pose: Pose,
     /// When the newest pose was taken.
     taken: Option<Instant>,
@@ -152,6 +154,7 @@ impl Finder {
         Self {
             since: None,
             still: ([0.0; JOINT_COUNT], Instant::from_ticks(0)),
+            last: None,
             pose: Pose::new(),
             taken: None,
             done: false,
@@ -171,6 +174,14 @@ impl Finder {
 
     /// A scan; the pose, when there has been one for long enough.
     pub fn take(&mut self, seen: &Seen<'_>) -> Option<Pose> {
+        let gap = self
+            .last
+            .replace(seen.at)
+            .is_some_and(|last| since(seen.at, last) > STILL_GAP);
+        if gap {
+            // Nobody saw what the hand did meanwhile.
+            (self.since, self.still) = (None, (*seen.angles, seen.at));
+        }
         if !seen.looks_flat() || !self.is_still(seen) {
             (self.since, self.done) = (None, false);
             return None;
@@ -196,17 +207,19 @@ impl Finder {
     }
 
     fn is_still(&mut self, seen: &Seen<'_>) -> bool {
-        let (reference, from) = &mut self.still;
-        if since(seen.at, *from) > STILL_FOR {
-            (*reference, *from) = (*seen.angles, seen.at);
-            return true;
-        }
         let known = |j: usize| seen.held >> j & 1 == 0;
-        reference
+        let (reference, from) = self.still;
+        let is_still = reference
             .iter()
             .zip(seen.angles)
             .enumerate()
-            .all(|(j, (a, b))| !known(j) || libm::fabsf(algebra::wrap(a - b)) <= STILL)
+            .all(|(j, (a, b))| !known(j) || libm::fabsf(algebra::wrap(a - b)) <= STILL);
+        let is_old = since(seen.at, from) > STILL_FOR;
+        if is_old {
+            self.still = (*seen.angles, seen.at);
+        }
+        // Within a pose the scan that the next ones are compared with is itself compared; before one, what is old says nothing.
+        is_still || (is_old && self.since.is_none())
     }
 }
 

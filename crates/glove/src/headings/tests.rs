@@ -102,3 +102,50 @@ fn numbers_that_are_none_spoil_one_scan_and_no_heading() {
     assert!(reading.angles.iter().all(|angle| angle.abs() < rad(0.5)));
     assert!(bench.headings.sigma().iter().all(|sigma| sigma.is_finite()));
 }
+
+/// A finder's pose: a flat hand whose headings are known, seen `before` a pause of `pause` scans and `after` it.
+fn found_across(before: u64, pause: u64, after: u64) -> bool {
+    let mut bench = Bench::new();
+    bench.asked(flat).expect("flat");
+    // Long after the pose that was asked for, the hand was elsewhere.
+    let bent = |k: usize| {
+        let [c, s] = algebra::half(if k == 5 { rad(45.0) } else { 0.0 });
+        quaternion(c, s, 0.0, 0.0)
+    };
+    bench.take(250, bent);
+    let mut found = false;
+    for k in 0..before + after {
+        bench.scan += if k == before { pause } else { 0 };
+        found |= bench.take(1, flat).pose.is_some();
+    }
+    found
+}
+
+#[test]
+fn a_flat_pose_is_not_found_across_a_pause_that_nobody_looked_at() {
+    assert!(found_across(10, 0, 45), "1.5 s without a pause are one");
+    assert!(!found_across(10, 70, 1), "2 s, of which 11 scans were seen");
+    assert!(!found_across(40, 8, 40), "229 ms");
+    assert!(found_across(10, 70, 55), "1.5 s after it");
+    assert!(found_across(30, 5, 25), "what a flipped bit or two cost");
+}
+
+#[test]
+fn a_hand_that_moves_when_the_look_is_renewed_is_not_still() {
+    // A jump of 8° in the first scan that is later than 0.7 s: flat before and after it.
+    let found = |jump: f32| {
+        let mut bench = Bench::new();
+        bench.asked(flat).expect("flat");
+        let bent = |by: f32| {
+            move |k: usize| {
+                let [c, s] = algebra::half(if k == 5 { rad(by) } else { 0.0 });
+                quaternion(c, s, 0.0, 0.0)
+            }
+        };
+        bench.take(250, bent(45.0));
+        let first = bench.take(26, flat).pose.is_some();
+        first || (0..35).any(|_| bench.take(1, bent(jump)).pose.is_some())
+    };
+    assert!(found(0.0));
+    assert!(!found(8.0));
+}

@@ -44,10 +44,12 @@ pub struct Command {
 /// A log, as far as an export needs it.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Exported {
-    /// Frames whose angles were known, in order.
+    /// Frames of which every angle was measured, in order.
     pub poses: Vec<Pose>,
-    /// Frames whose angles were not: they are in no table.
+    /// Frames whose angles were not known, or not those of a calibrated glove: they are in no table.
     pub unknown: u64,
+    /// Frames in which joints repeated an old angle, as `record` leaves them out, too.
+    pub held: u64,
     /// In order.
     pub commands: Vec<Command>,
     /// Which hand it says it is; a log of an earlier version does not say, and is taken for a right one.
@@ -83,6 +85,7 @@ pub fn read(path: &Path) -> Result<Exported> {
     if exported.poses.is_empty() && exported.commands.is_empty() {
         let why = match exported.damage.first() {
             Some(damage) => format!("nothing of it can be read ({damage})"),
+            None if exported.left_out() > 0 => exported.nothing_whole(),
             None => "it has no joint angles and no commands".to_owned(),
         };
         return Err(Failure::new(format!("{}: {why}", what()), record()).into());
@@ -119,10 +122,14 @@ impl Exported {
             *angle = read_number(written.get(name)?)?;
         }
         let valid = value.get("valid")?.as_bool()?;
-        if valid && angles.iter().all(|angle| angle.is_finite()) {
-            self.poses.push(Pose { time_us, angles });
-        } else {
+        // An earlier version did not write them down.
+        let held = value.get("held").and_then(Value::as_object);
+        if !valid || !angles.iter().all(|angle| angle.is_finite()) {
             self.unknown += 1;
+        } else if held.is_some_and(|held| !held.is_empty()) {
+            self.held += 1;
+        } else {
+            self.poses.push(Pose { time_us, angles });
         }
         Some(())
     }
@@ -151,13 +158,50 @@ impl Exported {
         Some(())
     }
 
+    /// Frames that are in no table.
+    fn left_out(&self) -> u64 {
+        self.unknown + self.held
+    }
+
+    /// Why there is no pose in it.
+    fn nothing_whole(&self) -> String {
+        format!(
+            "of none of its {} frames all joint angles were measured on a calibrated glove",
+            self.left_out()
+        )
+    }
+
+    /// That there are poses in it; `path` is its file's.
+    ///
+    /// # Errors
+    /// A failure that names the file, and says why there are none.
+    pub fn require_poses(&self, path: &Path) -> Result<(), Failure> {
+        if !self.poses.is_empty() {
+            return Ok(());
+        }
+        let why = match self.left_out() {
+            0 => "it has no joint angles".to_owned(),
+            _ => self.nothing_whole(),
+        };
+        Err(Failure::new(
+            format!("the session log {}: {why}", path.display()),
+            "a log of a run with a calibrated glove",
+        ))
+    }
+
     /// What a person should know of what was read, one line each.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         if self.unknown > 0 {
             notes.push(format!(
-                "{} frames whose angles were not known are left out",
+                "{} frames whose angles were not known, as of a glove that is not calibrated, are left out",
                 self.unknown
+            ));
+        }
+        if self.held > 0 {
+            notes.push(format!(
+                "{} frames in which a joint repeated an old angle are left out",
+                self.held
             ));
         }
         if self.strange > 0 {

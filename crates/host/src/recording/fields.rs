@@ -43,8 +43,19 @@ pub(super) fn joint_angles(frame: &Frame) -> Value {
         "time_us": frame.at.as_ticks(),
         "sequence": frame.sequence,
         "valid": frame.angles_valid,
+        "held": held(frame.held_joints),
         "angles": named(&JOINT_NAMES, &frame.angles),
     })
+}
+
+/// The joints of a mask (bit j: joint j), by name.
+fn held(joints: u32) -> Map<String, Value> {
+    JOINT_NAMES
+        .iter()
+        .enumerate()
+        .filter(|(joint, _)| joints >> joint & 1 == 1)
+        .map(|(_, name)| ((*name).to_owned(), json!(true)))
+        .collect()
 }
 
 /// `/map/output`.
@@ -241,7 +252,16 @@ pub(super) fn angles_schema(_: usize) -> Value {
             field(
                 "valid",
                 "boolean",
-                "whether every angle rests on good samples",
+                "whether the angles are the hand's: the scan gave them, and the glove is calibrated",
+            ),
+            (
+                "held".to_owned(),
+                object(
+                    "joints that repeat an old angle: a sensor beside them is lost, or a heading is not sure",
+                    JOINT_NAMES
+                        .iter()
+                        .map(|name| field(name, "boolean", "true")),
+                ),
             ),
             ("angles".to_owned(), numbers(&JOINT_NAMES, "radians")),
         ],

@@ -24,6 +24,7 @@ fn frame(sequence: u32) -> Record {
         imus: [imu; SEGMENT_COUNT],
         angles: core::array::from_fn::<f32, JOINT_COUNT, _>(|joint| joint as f32 / 10.0),
         angles_valid: true,
+        held_joints: 0,
         map_output: (sequence > 0).then_some([0.1, 254.7, 127.0, 64.0].into()),
         following: false,
         headings: None,
@@ -328,11 +329,16 @@ fn what_an_export_reads_is_what_was_recorded() {
     let path = folder.path().join("run.mcap");
     let mut all = records();
     all.push(moved(60, |frame| frame.angles_valid = false));
+    all.push(moved(90, |frame| frame.held_joints = 1 << 8));
     let (log, _feed) = log(&path, all);
     log.finish();
     assert!(export::is_log(&path));
     let exported = export::read(&path).unwrap();
-    assert_eq!((exported.poses.len(), exported.unknown), (2, 1));
+    let counts = (exported.poses.len(), exported.unknown, exported.held);
+    assert_eq!(counts, (2, 1, 1));
+    assert!(exported.require_poses(&path).is_ok());
+    let held = &read_back(&path)["/glove/joint_angles"][3]["held"];
+    assert_eq!(*held, serde_json::json!({ "index_pip_flex": true }));
     assert!(exported.finished && exported.damage.is_empty());
     let Record::Frame(frame) = frame(0) else {
         unreachable!("a frame is one");
@@ -349,6 +355,32 @@ fn what_an_export_reads_is_what_was_recorded() {
     assert_eq!(hand.lines().count(), 3);
     // The angles of this test are beyond a hand's: abduction comes back within a quarter turn only.
     assert!(worst.is_finite());
+}
+
+#[test]
+fn of_a_glove_that_was_never_calibrated_there_is_nothing_to_export() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let unknown = |us| moved(us, |frame| frame.angles_valid = false);
+    let (only_frames, _feed) = log(&path, (0..3).map(unknown));
+    only_frames.finish();
+    let error = export::read(&path).unwrap_err().to_string();
+    assert!(error.contains("of none of its 3 frames"), "{error}");
+    let mut with_commands = records();
+    for record in &mut with_commands {
+        if let Record::Frame(frame) = record {
+            frame.angles_valid = false;
+        }
+    }
+    let path = folder.path().join("commands.mcap");
+    let (log, _feed) = log(&path, with_commands);
+    log.finish();
+    let exported = export::read(&path).unwrap();
+    assert_eq!((exported.poses.len(), exported.unknown), (0, 2));
+    let refused = exported.require_poses(&path).unwrap_err().to_string();
+    assert!(refused.contains("of none of its 2 frames"), "{refused}");
+    assert!(!exported.commands.is_empty());
+    assert!(exported.notes()[0].contains("not calibrated"));
 }
 
 #[test]

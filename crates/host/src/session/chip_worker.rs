@@ -351,6 +351,17 @@ impl Worker {
         said.totals.count(&counters, now);
     }
 
+    /// Whether the newest sample's angles are the hand's. A bridge from before samples said it is believed but for what its
+    /// counters show.
+    fn angles_valid(&self) -> bool {
+        let told = self.sample.as_ref().and_then(Sample::is_valid);
+        told.unwrap_or(!self.useless && !self.lacks_calibration())
+    }
+
+    fn lacks_calibration(&self) -> bool {
+        self.calibration_known && !self.calibration.is_calibrated
+    }
+
     pub fn say(&mut self) {
         self.devices.status(&self.status);
         let status = &self.status;
@@ -377,7 +388,7 @@ impl Worker {
             frame: None,
             sensors: self.devices.sensors(),
             angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),
-            angles_valid: status.glove_answers && !self.useless,
+            angles_valid: status.glove_answers && self.angles_valid(),
             distrusted: self.devices.distrusted(),
             impossible: self.devices.impossible(),
             command: newest.and_then(|sample| Axes::new(&sample.command)),

@@ -262,6 +262,7 @@ mod tests {
                 command: message::PerAxis::new(),
                 position: message::PerAxis::new(),
                 latency_us: None,
+                not_shown: None,
             };
             hub.lock().sample(&sample, Position::Closed, |_| false);
         };

@@ -236,6 +236,7 @@ mod tests {
             imus: [imu; glove::hand::SEGMENT_COUNT],
             angles: [0.0; glove::hand::JOINT_COUNT],
             angles_valid: true,
+            held_joints: 0,
             map_output: None,
             following,
             headings: None,

@@ -59,6 +59,29 @@ fn a_hold_that_the_gripper_repeats_is_told_as_held_and_the_clutch_was_opened() {
 }
 
 #[test]
+fn angles_of_a_glove_that_is_not_calibrated_are_not_valid_whatever_else_is_well() {
+    let bridge = Scripted::start();
+    bridge.script().samples_flow = false;
+    let session = watching(&bridge);
+    for (not_shown, valid) in [
+        (Some(bridge::telemetry::ALL_JOINTS), false),
+        (Some(1 << 8), true),
+        (Some(bridge::telemetry::ALL_JOINTS), false),
+        (Some(0), true),
+    ] {
+        let mut sample = bridge.script().sample();
+        sample.not_shown = not_shown;
+        bridge.script().samples.push_back(sample);
+        until(&session, |seen| seen.angles_valid == valid);
+    }
+    // One from before samples said it: by what its health says.
+    let sample = bridge.script().sample();
+    bridge.script().calibration.is_calibrated = false;
+    bridge.script().samples.push_back(sample);
+    until(&session, |seen| !seen.angles_valid);
+}
+
+#[test]
 fn a_wire_that_is_cut_under_a_closed_clutch_leaves_nothing_that_is_called_held() {
     let bridge = Scripted::start();
     let mut session = following(&bridge);

@@ -42,8 +42,10 @@ pub struct Frame {
     pub imus: [Imu; SEGMENT_COUNT],
     /// Joint angles, radians.
     pub angles: [f32; JOINT_COUNT],
-    /// Whether they are usable.
+    /// Whether they are the hand's: the frame gave them, and the glove is calibrated.
     pub angles_valid: bool,
+    /// Joints that repeat an old angle, or whose heading is not sure (bit j: joint j).
+    pub held_joints: u32,
     /// What the map makes of them, counts; `None` where it was not asked.
     pub map_output: Option<Axes<f32>>,
     /// Whether the gripper follows the hand, so that a command must rest on this frame.

@@ -97,6 +97,7 @@ impl Script {
             command: PerAxis::from_slice(&self.command).unwrap(),
             position: PerAxis::from_slice(&self.gripper.map_or(vec![], Vec::from)).unwrap(),
             latency_us: None,
+            not_shown: None,
         }
     }
 

@@ -231,7 +231,8 @@ impl Worker {
                 .map(|sent| sent.stamp),
             status: telemetry.status_sequence,
         };
-        let useless = telemetry.frame_sequence > 0 && !telemetry.angles_valid;
+        // What a glove lacks that is not calibrated is told as that.
+        let useless = telemetry.frame_sequence > 0 && !telemetry.gives_angles;
         said.totals
             .here(&telemetry.counters, telemetry.now, self.scheduling);
         let seen = Snapshot {
@@ -333,6 +334,7 @@ fn frame_record<const X: usize>(telemetry: &Telemetry<X>) -> Option<Frame> {
         imus,
         angles: telemetry.angles,
         angles_valid: telemetry.angles_valid,
+        held_joints: telemetry.held_joints,
         map_output: telemetry.map_output.map(Into::into),
         following: telemetry.state.is_moving(),
         headings: Headings::of(telemetry),

@@ -78,6 +78,7 @@ impl Motion {
             for line in log.notes() {
                 reporter.note(&format!("note: {}: {line}", path.display()));
             }
+            log.require_poses(path)?;
             // What is asked of a file of poses is asked of a log's.
             Table::read(log.poses_csv().as_bytes(), path, columns).map_err(told)?
         } else {

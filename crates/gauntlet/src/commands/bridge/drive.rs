@@ -53,7 +53,7 @@ pub(super) fn engage(
     if let Some(left) = finished.left() {
         tell.say(format_args!("the clutch is open: {left}"));
     }
-    finish("bridge engage", at, finished, (None, Ok(())), driven)
+    finish("bridge engage", at, finished, Kept::nothing(), driven)
 }
 
 /// What comes before the clutch may close. Returns whether to go on.
@@ -91,18 +91,40 @@ pub(super) fn drive(
     run.drive(&options).map(drop)
 }
 
+/// What a run wrote besides its log.
+pub(super) struct Kept<'a> {
+    /// The poses file.
+    pub poses: Option<runs::Poses<'a>>,
+    /// Scans that are no row of it.
+    pub passed_over: Option<u64>,
+    /// What became of it.
+    pub written: Result<()>,
+}
+
+impl Kept<'_> {
+    /// None was to be written.
+    pub fn nothing() -> Self {
+        Self {
+            poses: None,
+            passed_over: None,
+            written: Ok(()),
+        }
+    }
+}
+
 /// The numbers, then the judgement over all of it.
 pub(super) fn finish(
     verb: &'static str,
     at: &BridgeAt,
     mut finished: Finished,
-    (poses, written): (Option<runs::Poses<'_>>, Result<()>),
+    kept: Kept<'_>,
     driven: Result<()>,
 ) -> Result<()> {
-    let (judgement, failure) = results::judged(finished.judge_with(driven, written));
+    let (judgement, failure) = results::judged(finished.judge_with(driven, kept.written));
     if at.json {
         let result = runs::Run {
-            poses,
+            poses: kept.poses,
+            passed_over: kept.passed_over,
             ..finished.result(failure)
         };
         results::print(verb, result)?;

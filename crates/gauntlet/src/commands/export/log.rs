@@ -61,6 +61,10 @@ pub(super) fn run(options: &Export) -> Result<()> {
         taken.push(path);
     }
     let log = export::read(&options.file)?;
+    // Asked for by name, an empty one is none.
+    if options.poses.is_some() || options.openxr.is_some() {
+        log.require_poses(&options.file)?;
+    }
     let mut error = None;
     let mut written = Vec::new();
     let (poses, commands) = (log.poses.len(), log.commands.len());

@@ -225,7 +225,14 @@ impl Judged {
                 .filter(|doubt| doubt.verdict() == verdict);
             doubts.filter_map(|doubt| todo(&doubt).1).min()
         };
-        of(Verdict::Bad).or_else(|| of(Verdict::Doubtful))
+        let again = of(Verdict::Bad).or_else(|| of(Verdict::Doubtful));
+        match again {
+            // A sensor that started anew is left out of the bending, until a turn shows its heading.
+            Some(Again::Alone | Again::Fists | Again::Thumb) if self.checks().restarted != 0 => {
+                Some(Again::Turn)
+            }
+            again => again,
+        }
     }
 
     /// Every joint with its checks.

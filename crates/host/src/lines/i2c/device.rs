@@ -16,13 +16,17 @@ use crate::lines::port::{OpenError, group_of};
 use crate::next::{Command, advice};
 
 /// The adapter behind a device file.
-struct Adapter(LinuxI2CBus);
+struct Adapter {
+    bus: LinuxI2CBus,
+    /// It was unplugged.
+    gone: bool,
+}
 
 impl Adapter {
     fn open(path: &Path) -> io::Result<Self> {
         let bus = LinuxI2CBus::new(path)?;
         shorten_timeout(&bus)?;
-        Ok(Self(bus))
+        Ok(Self { bus, gone: false })
     }
 }
 
@@ -58,18 +62,27 @@ impl I2c for Adapter {
                 Operation::Read(buffer) => LinuxI2CMessage::read(buffer).with_address(address),
             })
             .collect();
-        match self.0.transfer(&mut messages) {
-            Ok(_) => Ok(()),
-            Err(error) => Err(kind(&io::Error::from(error))),
-        }
+        self.bus.transfer(&mut messages).map(drop).map_err(|error| {
+            let error = io::Error::from(error);
+            self.gone |= is_gone(&error);
+            kind(&error)
+        })
     }
+}
+
+/// Whether the adapter itself is no longer there: what one on USB says once it is unplugged.
+fn is_gone(error: &io::Error) -> bool {
+    matches!(
+        error.raw_os_error(),
+        Some(libc::ENODEV | libc::ESHUTDOWN | libc::EBADF)
+    )
 }
 
 /// What an adapter's error number means (Documentation/i2c/fault-codes.rst). Most adapters tell a missing acknowledgement by EREMOTEIO or
 /// ENXIO, and none whether it was the address's.
 fn kind(error: &io::Error) -> ErrorKind {
     match error.raw_os_error() {
-        Some(libc::ENXIO | libc::EREMOTEIO | libc::ENODEV) => {
+        Some(libc::ENXIO | libc::EREMOTEIO) => {
             ErrorKind::NoAcknowledge(NoAcknowledgeSource::Unknown)
         }
         Some(libc::ETIMEDOUT | libc::EBUSY | libc::EIO) => ErrorKind::Bus,
@@ -86,7 +99,10 @@ impl Port {
     pub fn open(address: &Address) -> Result<Self, Failure> {
         let path = address.path();
         let adapter = Adapter::open(path).map_err(|error| refused(address, &error))?;
-        Self::over(address.to_string().into(), adapter).map_err(|error| {
+        let again = path.to_owned();
+        let name = address.to_string().into();
+        let open = move || Adapter::open(&again).ok();
+        Self::reopened(name, adapter, |adapter| adapter.gone, open).map_err(|error| {
             Failure::new(
                 format!("{address} cannot be used: {error}"),
                 "ending other programs",
@@ -152,6 +168,9 @@ mod tests {
         assert_eq!(of(libc::ETIMEDOUT), ErrorKind::Bus);
         for code in [libc::ENXIO, libc::EREMOTEIO] {
             assert!(matches!(of(code), ErrorKind::NoAcknowledge(_)));
+            assert!(!is_gone(&io::Error::from_raw_os_error(code)));
         }
+        assert!(is_gone(&io::Error::from_raw_os_error(libc::ENODEV)));
+        assert_eq!(of(libc::ENODEV), ErrorKind::Other);
     }
 }

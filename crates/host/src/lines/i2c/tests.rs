@@ -2,6 +2,7 @@ use super::*;
 use embedded_hal::i2c::{ErrorKind, ErrorType, Operation};
 use glove::bus::Transaction;
 use glove::scan::{BusScanner, Config};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Sender, channel};
 
 /// A bus that hangs in each call until it is let go.
@@ -103,6 +104,160 @@ fn a_bus_that_is_gone_is_told_and_the_port_is_dead() {
     port.start(&read(), at(0)).expect("idle");
     assert_eq!(answer(&mut port, at(1)), Err(Error::Port));
     assert!(port.is_dead() && !port.is_up());
+}
+
+/// A bus that can be unplugged: each call of one that was fails from then on, and it is opened anew only once it is back.
+struct Pluggable<I> {
+    bus: I,
+    plugged: Arc<AtomicBool>,
+    gone: bool,
+}
+
+impl<I: I2c> ErrorType for Pluggable<I> {
+    type Error = ErrorKind;
+}
+
+impl<I: I2c> I2c for Pluggable<I> {
+    fn transaction(
+        &mut self,
+        address: u8,
+        operations: &mut [Operation<'_>],
+    ) -> Result<(), ErrorKind> {
+        self.gone |= !self.plugged.load(Ordering::SeqCst);
+        match self.gone {
+            true => Err(ErrorKind::Other),
+            false => {
+                let done = self.bus.transaction(address, operations);
+                done.map_err(|error| embedded_hal::i2c::Error::kind(&error))
+            }
+        }
+    }
+}
+
+/// Looks, at times 20 ms apart, until it is so.
+fn until(port: &mut Port, us: &mut u64, what: impl Fn(&Port) -> bool) {
+    for _ in 0..10_000 {
+        *us += 20_000;
+        assert_eq!(port.poll(at(*us)), None);
+        if what(port) {
+            return;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    panic!("it never is: {:?}", port.state);
+}
+
+#[test]
+fn a_port_that_is_unplugged_says_so_and_is_opened_again_once_it_is_back() {
+    let (go, gate) = channel();
+    let plugged = Arc::new(AtomicBool::new(true));
+    let opened = Arc::new(AtomicU32::new(0));
+    let first = Pluggable {
+        bus: Hanging(gate),
+        plugged: Arc::clone(&plugged),
+        gone: false,
+    };
+    let (again, gate) = channel();
+    let mut next = Some(gate);
+    let (is_there, tries) = (Arc::clone(&plugged), Arc::clone(&opened));
+    let open = move || {
+        tries.fetch_add(1, Ordering::SeqCst);
+        let plugged = Arc::clone(&is_there);
+        let there = plugged.load(Ordering::SeqCst);
+        next.take_if(|_| there).map(|gate| Pluggable {
+            bus: Hanging(gate),
+            plugged,
+            gone: false,
+        })
+    };
+    let name = PathBuf::from("i2c:test");
+    let mut port = Port::reopened(name, first, |bus| bus.gone, open).expect("a thread");
+    let watch = port.watch();
+    go.send(()).expect("there");
+    port.start(&read(), at(0)).expect("idle");
+    assert_eq!(answer(&mut port, at(1)).expect("read"), [7, 7]);
+    assert!(watch.plugged() && port.is_up());
+
+    plugged.store(false, Ordering::SeqCst);
+    port.start(&read(), at(2)).expect("idle");
+    assert_eq!(answer(&mut port, at(3)), Err(Error::Port));
+    assert!(!watch.plugged() && !port.is_up() && watch.losses() == 1);
+    assert_eq!(port.start(&read(), at(4)), Err(Error::Port));
+    let mut us = 4;
+    until(&mut port, &mut us, |_| opened.load(Ordering::SeqCst) >= 6);
+    assert!(us > 6 * PORT_RETRY.as_ticks(), "tried too often: {us} µs");
+    assert!(
+        port.is_dead() && port.next_due().is_some(),
+        "and waited for"
+    );
+    assert!(go.send(()).is_err(), "the old one was closed");
+
+    plugged.store(true, Ordering::SeqCst);
+    until(&mut port, &mut us, Port::is_up);
+    assert!(watch.plugged() && !port.is_dead());
+    again.send(()).expect("there");
+    port.start(&read(), at(us)).expect("idle");
+    assert_eq!(answer(&mut port, at(us + 1)).expect("read"), [7, 7]);
+}
+
+#[test]
+fn a_glove_whose_adapter_was_unplugged_is_scanned_again() {
+    let clock = rig::Clock::new();
+    clock.set(at(700_000));
+    let glove = rig::glove::VirtualGlove::new(
+        Box::new(|t: f64| [t.sin() as f32 * 0.3; 25]),
+        rig::glove::Config::default(),
+    );
+    let plugged = Arc::new(AtomicBool::new(true));
+    let (there, time) = (Arc::clone(&plugged), clock.clone());
+    let open = move || {
+        there.load(Ordering::SeqCst).then(|| Pluggable {
+            bus: glove.i2c(&time, 400_000),
+            plugged: Arc::clone(&there),
+            gone: false,
+        })
+    };
+    let first = open().expect("plugged in");
+    let name = PathBuf::from("i2c:virtual");
+    let port = Port::reopened(name, first, |bus| bus.gone, open).expect("a thread");
+    let mut scanner = BusScanner::on(port, Config::default());
+    let mut whole = 0;
+    let mut lost = None;
+    for _ in 0..1_000_000 {
+        let now = clock.now();
+        if let Some(frame) = scanner.poll(now) {
+            whole += u32::from(frame.good() == 0xFFFF);
+            if whole == 20 && lost.is_none() {
+                plugged.store(false, Ordering::SeqCst);
+                (lost, whole) = (Some(now), 0);
+            }
+            if whole == 20 {
+                break;
+            }
+        }
+        if lost.is_some_and(|lost| now >= lost + DEAD) {
+            plugged.store(true, Ordering::SeqCst);
+        }
+        if matches!(
+            scanner.bus_mut().state,
+            State::Asked { .. } | State::Away { asked: Some(_), .. }
+        ) {
+            let wake = &scanner.bus_mut().readable;
+            let mut polled = [rustix::event::PollFd::new(
+                &**wake,
+                rustix::event::PollFlags::IN,
+            )];
+            rustix::event::poll(&mut polled, None).expect("polls");
+        } else if let Some(due) = scanner.next_due() {
+            clock.set(due.max(now));
+        }
+    }
+    assert_eq!(whole, 20, "{:?}", scanner.health());
+    let took = clock.now().checked_duration_since(lost.expect("unplugged"));
+    assert!(
+        took.is_some_and(|took| took.as_millis() < 7_000),
+        "{took:?}"
+    );
 }
 
 #[test]
