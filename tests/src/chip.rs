@@ -15,6 +15,8 @@ pub const BITS: u32 = 1;
 pub const REPLAY: u32 = 2;
 /// Order: instruction counts. First input an image, second a trace.
 pub const COUNT: u32 = 3;
+/// Order: a recorded calibration session ([`crate::golden`]).
+pub const SESSION: u32 = 4;
 
 const ORDER_AT: u64 = 1 << 20;
 const OUTPUT_AT: u64 = 10 << 20;

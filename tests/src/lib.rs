@@ -5,6 +5,7 @@ pub mod bits;
 pub mod chip;
 pub mod debugger;
 pub mod emulated;
+pub mod golden;
 pub mod images;
 pub mod killed;
 pub mod nor_slot;

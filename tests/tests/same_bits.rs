@@ -1,4 +1,5 @@
-//! The same inputs give the same bits here and on the emulated chip: the map, and the whole bridge over a stored trace.
+//! The same inputs give the same bits here and on the emulated chip: the map, calibration and headings over recorded sessions, and the
+//! whole bridge over a stored trace.
 //! Skipped, with a word, where QEMU or the firmware is missing.
 #![allow(missing_docs)]
 
@@ -7,6 +8,7 @@ use hae::image::JointOrder;
 use loop_tests::bits::{self, compare};
 use loop_tests::chip::{self, bench};
 use loop_tests::emulated::alone;
+use loop_tests::golden;
 use loop_tests::images::{self, SHAPE};
 use loop_tests::replay;
 use loop_tests::trace::{at_the_devices, counts, first_difference, replayed, short, worn};
@@ -25,6 +27,24 @@ fn the_map_gives_the_same_bits_here_and_on_the_chip() {
         inputs.len()
     );
     assert!(inputs.len() >= 10_000 && refused > 50);
+}
+
+#[test]
+fn recorded_sessions_give_the_same_profile_and_the_same_angles_here_and_on_the_chip() {
+    for name in golden::SESSIONS {
+        let Some(recorded) = golden::session(name) else {
+            return;
+        };
+        let here = golden::here(&recorded);
+        assert!(here.len() > 2_000 * 26 * 4, "{name}: {} bytes", here.len());
+        let Some(bench) = bench() else { return };
+        let _alone = alone();
+        let rows = golden::rows(&recorded);
+        let chip = chip::run(&bench, chip::SESSION, &rows, &[], false).expect("an output");
+        let differ = here.iter().zip(&chip).position(|(here, chip)| here != chip);
+        assert_eq!((chip.len(), differ), (here.len(), None), "{name}");
+        println!("{name}: {} bytes, all the same", chip.len());
+    }
 }
 
 #[test]

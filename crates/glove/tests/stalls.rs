@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{ALL, Bench, assert_true, waving};
+use common::{ALL, Bench, assert_true, cost, waving};
 use glove::{Duration, Instant};
 
 /// A small generator, so that a run can be repeated.
@@ -30,8 +30,12 @@ fn after_a_stall_no_sample_rests_on_bytes_from_before_its_end() {
         bench.clock.advance(Duration::from_ticks(length));
         let end = bench.clock.now();
         // After half a second the sensors are asked first who they are.
-        let asked = if length > 500_000 { 180_000 } else { 0 };
-        let frames = bench.until_timed(end.as_ticks() + 100_000 + asked);
+        const ASKED: u64 = cost::who_is_there(115_200);
+        let (asked, look) = match length > 500_000 {
+            true => (ASKED, 280_000),
+            false => (0, 100_000),
+        };
+        let frames = bench.until_timed(end.as_ticks() + look);
         let what = format!("stall {stall} of {length} us at {at:?}");
         let (first_at, _) = frames.first().expect("frames again in time");
         assert!(

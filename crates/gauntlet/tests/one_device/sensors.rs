@@ -1,4 +1,4 @@
-//! What `teleop` says of sensors that do not come up: the same as `doctor`.
+//! What `doctor` says of sensors, and `teleop` of those that do not come up: the same.
 
 use crate::support;
 
@@ -52,4 +52,17 @@ fn a_register_of_a_sensor_that_reads_back_otherwise_is_named_by_doctor_and_teleo
     contains(&doctor, &WORDS);
     contains(&teleop, &WORDS);
     assert_eq!(code, Some(1), "{teleop}");
+}
+
+#[test]
+fn doctor_tells_of_each_of_sixteen_healthy_sensors_how_it_is() {
+    let (_glove, _glove_port, path) = glove(115_200);
+    let doctor = run(&["doctor", "--glove", &path]);
+    let said = text(&doctor.stdout);
+    for words in ["IMU mode", "self-test passed", "gyroscope 3"] {
+        assert_eq!(said.matches(words).count(), 16, "{words}: {said}");
+    }
+    contains(&said, &["little_distal (channel 7, address 0x29): id "]);
+    assert!(!said.contains("does not say"), "{said}");
+    assert_eq!(doctor.status.code(), Some(0), "{said}");
 }

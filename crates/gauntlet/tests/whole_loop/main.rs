@@ -8,6 +8,7 @@ mod debugger;
 mod support;
 
 mod browser;
+mod chip_calibrated;
 mod chip_judged;
 mod demo;
 mod devices;

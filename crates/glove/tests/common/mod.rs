@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test takes what it needs")]
 #![allow(clippy::unwrap_used, reason = "a test may")]
 
+pub mod cost;
 pub mod fuzz;
 
 use glove::Instant;

@@ -6,6 +6,7 @@
 //! | 1 bits | an image, then inputs of 25 f32 | for each input 4 f32 of the chip's kernel and 4 of the portable one; a refusal is a NaN, the input's number, its bits and a zero |
 //! | 2 replay | a trace | what the bridge puts out (`replay`) |
 //! | 3 count | an image's bytes, then a trace | lines of text: instructions by name |
+//! | 4 session | a recorded calibration session | its profile, and the angles of the use after it (`session`) |
 #![no_std]
 #![no_main]
 
@@ -17,6 +18,7 @@ mod memory;
 #[path = "../../replay.rs"]
 #[allow(dead_code)]
 mod replay;
+mod session;
 
 use bridge::hae::Map;
 use memory::{Memory, exit};
@@ -30,6 +32,7 @@ fn main() -> ! {
         1 => bits(memory),
         2 => replayed(memory),
         3 => count::all(memory),
+        4 => session::run(memory.first, memory.output),
         _ => None,
     });
     memory::finish(done);

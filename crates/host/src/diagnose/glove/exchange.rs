@@ -12,18 +12,22 @@ const LOOK: Duration = Duration::from_millis(1);
 /// Looks for one answer: longer than the port's own deadline.
 const LOOKS: u32 = 200;
 
-/// Makes a batch and waits for its end.
+/// Makes a batch and waits for its end. `clock`: the one by which the bus was driven before, whose deadlines it has. What is
+/// still under way there is waited for, and lost.
 pub(super) fn exchange(
     bus: &mut impl Bus,
     batch: &Batch,
+    clock: Clock,
     interrupt: &Interrupt,
 ) -> Result<Reply, Error> {
-    let clock = Clock::start();
     let mut begun = false;
     for _ in 0..LOOKS {
         if !begun && bus.is_up() {
-            bus.start(batch, clock.now())?;
-            begun = true;
+            match bus.start(batch, clock.now()) {
+                Ok(()) => begun = true,
+                Err(Error::Busy) => {}
+                Err(error) => return Err(error),
+            }
         }
         if let Some(result) = bus.poll(clock.now()).filter(|_| begun) {
             return result;

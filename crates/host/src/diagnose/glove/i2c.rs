@@ -9,6 +9,7 @@ use glove::scan::Config;
 use super::bridge_chip::MULTIPLEXERS;
 use super::exchange::exchange;
 use super::sensors;
+use crate::clock::Clock;
 use crate::diagnose::Findings;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
@@ -109,7 +110,7 @@ fn multiplexer(port: &mut Port, interrupt: &Interrupt) -> Result<u8, Error> {
 fn ask(port: &mut Port, address: u8, interrupt: &Interrupt) -> Result<(), Error> {
     let batch = Transaction::read(address, 1)
         .and_then(|read| Batch::from_slice(&[read]).map_err(|_| Error::Unsupported))?;
-    exchange(port, &batch, interrupt).map(drop)
+    exchange(port, &batch, Clock::start(), interrupt).map(drop)
 }
 
 /// The layer, what is wrong, and what to try.

@@ -6,7 +6,7 @@ use glove::imu::{self, Mode, UniqueId, register};
 use glove::scan::Frame;
 
 use super::exchange::exchange;
-use crate::clock::since;
+use crate::clock::{Clock, since};
 use crate::diagnose::Findings;
 use crate::interrupt::Interrupt;
 
@@ -93,21 +93,21 @@ impl Lying {
     }
 }
 
-/// Asks each sensor what it says of itself, and tells it with how it lay.
+/// Asks each sensor what it says of itself, and tells it with how it lay. `clock`: by which the bus was driven.
 pub(super) fn tell(
     bus: &mut impl Bus,
     mux: u8,
     ids: &[Option<UniqueId>; SEGMENT_COUNT],
     lying: &Lying,
     findings: &mut Findings,
-    interrupt: &Interrupt,
+    (clock, interrupt): (Clock, &Interrupt),
 ) {
     let rests: [Option<Rest>; SEGMENT_COUNT] = std::array::from_fn(|k| lying.rest(k));
     for (k, (id, rest)) in ids.iter().zip(rests).enumerate() {
         if interrupt.asked() {
             return findings.note("sensors", "interrupted", "again");
         }
-        match registers(bus, mux, k, interrupt) {
+        match registers(bus, mux, k, clock, interrupt) {
             Some(read) => one(k, id.as_ref(), &read, rest, findings),
             None => findings.note(
                 "sensors",
@@ -129,12 +129,18 @@ pub(super) fn tell(
 }
 
 /// Nine registers of sensor `k`.
-fn registers(bus: &mut impl Bus, mux: u8, k: usize, interrupt: &Interrupt) -> Option<[u8; COUNT]> {
+fn registers(
+    bus: &mut impl Bus,
+    mux: u8,
+    k: usize,
+    clock: Clock,
+    interrupt: &Interrupt,
+) -> Option<[u8; COUNT]> {
     let select = Transaction::write(mux, &[1 << imu::channel(k)]).ok()?;
     let read = Transaction::write_read(imu::address(k), &[FIRST], COUNT).ok()?;
     let batch = Batch::from_slice(&[select, read]).ok()?;
     (0..TRIES).find_map(|_| {
-        let read = exchange(bus, &batch, interrupt).ok()?;
+        let read = exchange(bus, &batch, clock, interrupt).ok()?;
         read.as_slice().try_into().ok()
     })
 }

@@ -54,7 +54,8 @@ pub fn sensors<B: Bus>(
     findings: &mut Findings,
     interrupt: &Interrupt,
 ) {
-    let mut pc = Pc::new(Clock::start(), [watch], interrupt.clone());
+    let clock = Clock::start();
+    let mut pc = Pc::new(clock, [watch], interrupt.clone());
     let layer = match glove.found {
         Some(_) => "bridge",
         None => "bus",
@@ -130,7 +131,8 @@ pub fn sensors<B: Bus>(
         let mut worn = worn::Worn::of(&ids, findings);
         let lying = watch_lying(&mut scanner, &mut pc, &mut worn, glove.place, interrupt);
         let mut bus = scanner.into_bus();
-        own::tell(&mut bus, glove.mux, &ids, &lying, findings, interrupt);
+        let driven = (clock, interrupt);
+        own::tell(&mut bus, glove.mux, &ids, &lying, findings, driven);
         worn.tell(glove.place, findings);
     }
 }
