@@ -6,7 +6,6 @@ pub mod chip;
 pub mod debugger;
 pub mod emulated;
 pub mod images;
-pub mod killed;
 pub mod nor_slot;
 pub mod power_cuts;
 pub mod sessions;
