@@ -7,7 +7,6 @@ pub mod debugger;
 pub mod emulated;
 pub mod golden;
 pub mod images;
-pub mod killed;
 pub mod nor_slot;
 pub mod power_cuts;
 pub mod sessions;

@@ -2,7 +2,9 @@
 #![allow(missing_docs)]
 
 use host::recording::traced::Traced;
-use host::replay;
+use host::replay::{self, Changes};
+use host::session::Driving;
+use loop_tests::images;
 use loop_tests::sessions::replayed;
 
 #[test]
@@ -52,4 +54,38 @@ fn a_log_cut_anywhere_or_with_a_flipped_bit_is_replayed_as_far_as_it_goes() {
         assert_eq!(same.difference, None, "bit at {place}");
     }
     println!("{} bytes, {read} cuts could be replayed", bytes.len());
+}
+
+#[test]
+fn another_map_or_setting_is_compared_frame_by_frame_and_the_same_one_differs_in_nothing() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("session.mcap");
+    replayed(5, 12, &path);
+    let traced = Traced::read(&path).expect("a log");
+    let compared = |changes: &Changes| {
+        let compared = replay::compare(&traced, changes, &mut ()).expect("two bridges");
+        println!("{compared:?}");
+        assert!(compared.frames > 200 && compared.output.frames > 100);
+        compared
+    };
+    let same = compared(&Changes::default());
+    assert_eq!((same.output.max, same.output.one_sided), (0.0, 0));
+    let image = Some(images::gentle(6));
+    let map = compared(&Changes {
+        image,
+        ..Changes::default()
+    });
+    assert!(map.output.max > 1.0 && map.output.mean > 0.0 && map.output.mean < map.output.max);
+    assert!(map.output.max_axis < 4 && map.output.max_at_us <= traced.end);
+    // A slower gripper is told something else by the same map.
+    let driving = Driving {
+        rate: Some(20.0),
+        ..Driving::default()
+    };
+    let slow = compared(&Changes {
+        driving,
+        ..Changes::default()
+    });
+    assert_eq!((slow.output.max, slow.output.one_sided), (0.0, 0));
+    assert!(slow.command.max > same.command.max, "{same:?}");
 }

@@ -58,14 +58,37 @@ fn ignored(title: &'static str, package: &str, test: &str) -> Result<(), Failure
     )
 }
 
-/// 50 stalls of 0.1 to 3 s with real processes, on the PC and in QEMU.
-pub fn stalls() -> Result<(), Failure> {
-    let firmware = crate::firmware::build()?;
+/// 50 seeded sessions with faults, replayed from their logs; 100 runs killed, a disk full at 20 sizes.
+pub fn sessions() -> Result<(), Failure> {
+    step::run("sessions", &mut crate::firmware::campaign("sessions"))?;
+    kept_logs("logs of killed runs and full disks", "kept_log::")
+}
+
+/// The loop with and without a log, in turns.
+pub fn log_cost() -> Result<(), Failure> {
+    kept_logs("a log's cost", "log_cost::")
+}
+
+/// The ignored whole-loop tests of this name, with the tool's release build.
+fn kept_logs(title: &'static str, name: &str) -> Result<(), Failure> {
+    let tool = released()?;
+    let only = ["--ignored", "--nocapture", "--test-threads", "1", name];
+    step::run(title, step::whole_loop().args(only).env("GAUNTLET", tool))
+}
+
+/// The tool's release build.
+fn released() -> Result<std::path::PathBuf, Failure> {
     step::run(
         "the tool",
         &mut cargo(&["build", "--release", "--locked", "--package", "gauntlet"]),
     )?;
-    let tool = step::workspace_root().join("target/release/gauntlet");
+    Ok(step::workspace_root().join("target/release/gauntlet"))
+}
+
+/// 50 stalls of 0.1 to 3 s with real processes, on the PC and in QEMU.
+pub fn stalls() -> Result<(), Failure> {
+    let firmware = crate::firmware::build()?;
+    let tool = released()?;
     step::run(
         "stalls",
         cargo(&[

@@ -41,7 +41,8 @@ chores:
   campaign gripper    the gripper's long campaigns: rates beside the glove, cut wires; minutes
   campaign glove      virtual persons in honest gloves: errors of ten minutes, what the checks find; minutes
   campaign teaching   live trainings by the virtual person in honest gloves, killed and gone on; minutes
-  campaign sessions   seeded sessions with faults replayed from their logs, writers killed; minutes
+  campaign sessions   seeded sessions with faults replayed from their logs, runs killed, disks full; half an hour
+  campaign log-cost   the loop with and without a log, five pairs of runs in turns; on a quiet machine
   campaign stalls     processes that stand still in motion, on the PC and in QEMU; minutes
   campaign view       what a page costs the loop (five pairs of runs), an hour's soak; on a quiet machine
   fuzz [--short]      the fuzz targets under cargo-fuzz, 10 minutes each (30 s with --short); where
@@ -82,7 +83,8 @@ fn main() -> ExitCode {
         ["campaign", "teaching"] => campaign::teaching(),
         ["campaign", "stalls"] => campaign::stalls(),
         ["campaign", "view"] => campaign::view(),
-        ["campaign", "sessions"] => step::run("sessions", &mut firmware::campaign("sessions")),
+        ["campaign", "sessions"] => campaign::sessions(),
+        ["campaign", "log-cost"] => campaign::log_cost(),
         ["fuzz"] => fuzz::run(fuzz::Length::Long),
         ["fuzz", "--short"] => fuzz::run(fuzz::Length::Short),
         ["pictures"] => pictures::run(),

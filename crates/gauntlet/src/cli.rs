@@ -174,7 +174,7 @@ pub fn run(cli: Cli) -> Result<()> {
         Verb::Simulate(options) => simulate::run(&options, &interrupt()?),
         Verb::Teleop(options) => teleop::run(&options, &interrupt()?),
         Verb::Replay(options) => replay::run(&options, &interrupt()?),
-        Verb::Export(options) => export::run(&options),
+        Verb::Export(options) => export::run(&options, &interrupt()?),
         Verb::Flash(options) => flash::run(&options, &interrupt()?),
         Verb::Bridge(options) => bridge::run(&options, &interrupt()?),
         Verb::Ports(options) => ports::run(&options),

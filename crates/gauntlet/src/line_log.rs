@@ -1,14 +1,15 @@
-//! The log of one line: of a glove that is read by itself, by `record` and `calibrate`, or of a bridge that is watched, by
-//! `bridge monitor`.
+//! The log of one line: of a glove that is read by itself, by `record` and `calibrate`.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 
-use crate::outputs;
 use crate::tell::Tell;
+use crate::{note, outputs};
 use host::clock::Clock;
-use host::recording::{Drawn, SessionLog};
+use host::glove::hand::Side;
+use host::interrupt::Interrupt;
+use host::recording::{Drawn, QUEUE, SessionLog};
 use host::session::record::{Feed, Records, queue};
 use host::trace::TraceLog;
 
@@ -17,6 +18,7 @@ use host::trace::TraceLog;
 pub struct LineLog {
     path: PathBuf,
     feed: Option<Feed>,
+    trace: TraceLog,
     records: Option<Records>,
     log: Option<SessionLog>,
 }
@@ -31,10 +33,10 @@ impl LineLog {
             return Ok(Self::default());
         };
         outputs::check_new(path, "a log")?;
-        // The scans are in the trace.
-        let (feed, records) = queue(1);
+        let (feed, records) = queue(QUEUE);
         Ok(Self {
             path: path.to_owned(),
+            trace: feed.trace(),
             feed: Some(feed),
             records: Some(records),
             log: None,
@@ -43,22 +45,32 @@ impl LineLog {
 
     /// What the reading writes.
     pub fn trace(&self) -> TraceLog {
-        self.feed.as_ref().map(Feed::trace).unwrap_or_default()
+        self.trace.clone()
     }
 
-    /// Makes the file.
+    /// Where the scans go, of which there are decoded channels; once.
+    pub fn feed(&mut self) -> Option<Feed> {
+        self.feed.take()
+    }
+
+    /// Makes the file, of such a hand. Once it takes nothing more, whoever watches is told; the reading goes on.
     ///
     /// # Errors
     /// A failure that names it.
-    pub fn begin(&mut self, clock: Clock) -> Result<()> {
+    pub fn begin(&mut self, clock: Clock, side: Side, interrupt: &Interrupt) -> Result<()> {
         if let Some(records) = self.records.take() {
-            // Nothing of it is decoded: the pictures are those of a log whose hand has not moved yet.
-            self.log = Some(SessionLog::create(
-                &self.path,
-                Drawn::USUAL,
-                clock,
-                records,
-            )?);
+            let place = self.path.display().to_string();
+            let tell = move |fault: &str| {
+                note!("the log {place} ended: {fault}; the rest goes on without it");
+            };
+            let drawn = Drawn {
+                side,
+                ..Drawn::USUAL
+            };
+            let log = SessionLog::create_telling(&self.path, drawn, clock, records, tell)?;
+            self.log = Some(log);
+            // A file that grew to its limit is told so, and ends nothing.
+            interrupt.look_after_file_limit();
         }
         Ok(())
     }

@@ -172,6 +172,98 @@ fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
 }
 
 #[test]
+fn a_recording_s_log_has_every_scan_and_one_that_finds_no_room_is_told_while_the_recording_goes_on()
+{
+    let bench = Bench::new();
+    let tool = command(&[]).get_program().to_str().unwrap().to_owned();
+    for (blocks, name) in [("unlimited", "whole"), ("600", "short")] {
+        let [out, log] = ["csv", "mcap"].map(|end| format!("{name}.{end}"));
+        let place = bench.file(&log).display().to_string();
+        let more = ["--ideal", "--seconds", "6", "--json", "--log", &place];
+        let child = std::process::Command::new("sh")
+            .args([
+                "-c",
+                &format!("ulimit -f {blocks}; exec '{tool}' \"$@\""),
+                "sh",
+            ])
+            .args(bench.arguments(&out, &more))
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let output = finish(child);
+        let said = text(&output.stderr);
+        let rows = rows(&bench.file(&out)) as u64;
+        assert!(
+            rows > 20 && rows == result(&output)["poses"]["rows"],
+            "{said}"
+        );
+        let is_short = name == "short";
+        assert_eq!(
+            said.contains("the rest goes on without it"),
+            is_short,
+            "{said}"
+        );
+        if is_short {
+            let failure = &result(&output)["failure"];
+            assert!(
+                failure["error"].as_str().unwrap().contains("incomplete"),
+                "{failure}"
+            );
+            continue;
+        }
+        // What it says of the hand is the recording, and what came over the port reads the glove again.
+        let poses = bench.file("again.csv");
+        let words = [
+            "export",
+            &place,
+            "--poses",
+            poses.to_str().unwrap(),
+            "--json",
+        ];
+        let exported = json(&run(&words));
+        let exported = exported["tables"][0]["rows"].as_u64().unwrap();
+        assert!(
+            exported >= rows && exported < rows + 100,
+            "{exported} {rows}"
+        );
+        let replayed = json(&run(&["replay", &place, "--json"]));
+        assert!(
+            replayed["glove_bytes_alike"].as_u64() > Some(1_000),
+            "{replayed}"
+        );
+        assert!(replayed["difference"].is_null(), "{replayed}");
+        for other in [&["--rate", "50"][..], &["--to", "virtual"]] {
+            let words = [&["replay", &place], other].concat();
+            assert!(refusal(&run(&words), 2).contains("read by itself"));
+        }
+    }
+}
+
+#[test]
+fn a_log_without_a_name_has_that_of_its_second() {
+    let bench = Bench::new();
+    let arguments = bench.arguments("hand.csv", &["--ideal", "--seconds", "1", "--log"]);
+    let words: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let output = command(&words)
+        .current_dir(bench.folder.path())
+        .output()
+        .unwrap();
+    let names = std::fs::read_dir(bench.folder.path()).unwrap();
+    let names = names.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+    let logs: Vec<String> = names.filter(|name| name.ends_with(".mcap")).collect();
+    let [log] = &logs[..] else {
+        panic!("{logs:?}: {}", text(&output.stderr));
+    };
+    // gauntlet-2026-11-30T00-25-00Z.mcap, or as near to that as it is: a name that every file system takes.
+    assert!(
+        log.starts_with("gauntlet-20") && !log.contains(':'),
+        "{log}"
+    );
+}
+
+#[test]
 fn a_glove_is_watched_with_every_sensor_named_and_its_lost_samples_counted() {
     let (device, _handle, path) = glove(115_200);
     let child = start(&[

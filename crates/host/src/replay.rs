@@ -32,12 +32,30 @@ pub use compared::{Apart, Compared, compare};
 pub trait Follow {
     /// Before each turn of the loop; at `at` µs. Returns whether it goes on.
     fn turn<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>, at: u64) -> bool;
+
+    /// The same where a glove was read by itself: there is no bridge.
+    fn reading(&mut self, _at: u64) -> bool {
+        true
+    }
 }
 
 /// Nobody looks.
 impl Follow for () {
     fn turn<B: Board<X>, const X: usize>(&mut self, _: &mut App<B, X>, _: u64) -> bool {
         true
+    }
+}
+
+/// Two look, and either ends it.
+struct Both<'a, A, C>(&'a mut A, &'a mut C);
+
+impl<A: Follow, C: Follow> Follow for Both<'_, A, C> {
+    fn turn<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>, at: u64) -> bool {
+        self.0.turn(app, at) && self.1.turn(app, at)
+    }
+
+    fn reading(&mut self, at: u64) -> bool {
+        self.0.reading(at) && self.1.reading(at)
     }
 }
 
@@ -148,16 +166,17 @@ fn run<S: Source, G: SerialPort>(
     let why = match traced.home.glove.as_str() {
         "serial" => None,
         "chip" => Some(
-            "the log is of a bridge on a chip: it holds what that told and was told, and not what came over its ports",
+            "it is of a bridge on a chip: it holds what that told and was told, and not what came over its ports",
         ),
-        _ => Some("the log's glove was on an I²C port, whose bytes a log does not hold"),
+        _ => Some("its glove was on an I²C port, whose bytes a log does not hold"),
     };
     if let Some(why) = why {
         let next = "a log of teleop or demo with a glove on a serial port";
-        return Err(Failure::new(why, next).into());
+        let what = format!("{} cannot be replayed: {why}", traced.path.display());
+        return Err(Failure::new(what, next).into());
     }
     if traced.is_scan() {
-        scan(source, traced);
+        scan(source, traced, follow);
         return Ok(());
     }
     match traced.model.two_finger() {
@@ -170,11 +189,14 @@ fn run<S: Source, G: SerialPort>(
 }
 
 /// A glove that was read by itself: only what is written to it can be compared.
-fn scan<S: Source>(source: &S, traced: &Traced) {
+fn scan<S: Source>(source: &S, traced: &Traced, follow: &mut impl Follow) {
     let config = traced.home.scan.config();
     let mut scanner = Scanner::new(Port::new(source, GLOVE), config).with_set_baud();
     while !source.is_over() {
         let now = source.now();
+        if !follow.reading(now.as_ticks()) {
+            return;
+        }
         // What became of the sensors is in the next writes.
         let _ = scanner.poll(now);
         source.wait_until(scanner.next_due().unwrap_or(now));
@@ -245,8 +267,8 @@ pub struct GripperLine {
     pub positions: Option<Vec<u8>>,
 }
 
-/// What went over the line to the gripper, and where the gripper stood at last.
-pub fn gripper_line(traced: &Traced) -> GripperLine {
+/// What went over the line to the gripper, and where the gripper stood at last; `follow` sees the turns.
+pub fn gripper_line(traced: &Traced, follow: &mut impl Follow) -> GripperLine {
     let mut line = GripperLine::default();
     let mut reader = Reader::new(&traced.bytes);
     while let Ok(Some(entry)) = reader.read() {
@@ -260,7 +282,7 @@ pub fn gripper_line(traced: &Traced) -> GripperLine {
     }
     let mut stood = Stood(None);
     // A log that cannot be replayed is told elsewhere.
-    if same(traced, &mut stood).is_ok() {
+    if same(traced, &mut Both(&mut stood, follow)).is_ok() {
         line.positions = stood.0;
     }
     line
@@ -278,3 +300,6 @@ impl Follow for Stood {
         true
     }
 }
+
+#[cfg(test)]
+mod tests;

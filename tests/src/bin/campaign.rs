@@ -13,7 +13,7 @@ use loop_tests::power_cuts::{
     self, UNIT, every_pair, every_single, four_kilobytes, full_size, small,
 };
 use loop_tests::trace::{self, record};
-use loop_tests::{bits, images, killed, random, sessions, slot_contents};
+use loop_tests::{bits, images, sessions, slot_contents};
 
 const SEED: u64 = 0x6175_6E74_6C65_7400;
 /// Gripper cycles a second that a bridge on the chip must reach.
@@ -29,11 +29,7 @@ fn main() -> ExitCode {
         ["powercut", "qemu"] => kills(),
         ["same-bits"] => same_bits(),
         ["measure"] => measure(),
-        ["sessions"] => sessions().and_then(|()| killed_logs()),
-        ["log-writer", path] => {
-            killed::write_for_ever(std::path::Path::new(path));
-            Ok(())
-        }
+        ["sessions"] => sessions(),
         ["count"] => counts().map(|text| print!("{text}")),
         _ => Err(
             "usage: campaign powercut [store | contents | qemu] | same-bits | sessions | measure | count"
@@ -189,27 +185,6 @@ fn sessions() -> Result<(), String> {
         return Err("a replay must be 20 times as fast as the session".to_owned());
     }
     Ok(())
-}
-
-/// Logs whose writer is killed.
-fn killed_logs() -> Result<(), String> {
-    let folder = tempfile::tempdir().map_err(|error| error.to_string())?;
-    let (lost, s) = shown("kills", |p| {
-        let kill = |number: u64| {
-            let time = Duration::from_millis(300 + random(SEED + number) % 3_000);
-            let path = folder.path().join(format!("{number}.mcap"));
-            let lost = killed::kill_after(time, &path);
-            p(number, 100);
-            // Killed before its first half second it has nothing yet.
-            lost.unwrap_or(time.as_secs_f64())
-        };
-        (1..=100).map(kill).fold(0.0, f64::max)
-    });
-    println!("100 writers killed: at most {lost:.3} s before the kill are missing ({s:.0} s)");
-    match lost <= 1.0 {
-        true => Ok(()),
-        false => Err("a killed run loses 1 s at most".to_owned()),
-    }
 }
 
 /// The recorded hand where it is there, else one that moves all joints.

@@ -1,7 +1,7 @@
 //! A whole session at a bench: the tool between a virtual glove, whose hand can be told to move, and a virtual gripper.
 
 use std::io::Read;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
@@ -95,6 +95,34 @@ impl Bench {
     /// From now on the hand moves.
     pub fn hand_moves(&self) {
         self.moves.store(true, Ordering::Relaxed);
+    }
+
+    /// From now on it lies flat.
+    pub fn hand_lies_flat(&self) {
+        self.moves.store(false, Ordering::Relaxed);
+    }
+
+    /// The next run's log is another file.
+    pub fn log_to(&mut self, name: &str) {
+        let path = self.log.with_file_name(name);
+        self.log_at(&path);
+    }
+
+    /// The same at any place.
+    pub fn log_at(&mut self, path: &Path) {
+        let place = self.arguments.iter().position(|word| word == "--log");
+        self.arguments[place.unwrap() + 1] = path.to_str().unwrap().to_owned();
+        self.log = path.to_owned();
+    }
+
+    /// Until the run has made its log: driving begins.
+    pub fn until_logged(&self, child: &mut Child) {
+        let end = Instant::now() + BRINGUP;
+        while !self.log.exists() {
+            assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+            assert!(Instant::now() < end, "no log was made");
+            std::thread::sleep(Duration::from_millis(2));
+        }
     }
 
     /// Until something is commanded.

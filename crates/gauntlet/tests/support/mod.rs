@@ -30,6 +30,18 @@ pub fn command(arguments: &[&str]) -> Command {
     command
 }
 
+/// The same with the program that `GAUNTLET` names, where it does: campaigns measure a release build.
+pub fn tool(arguments: &[&str]) -> Command {
+    let usual = command(arguments);
+    let Some(program) = std::env::var_os("GAUNTLET") else {
+        return usual;
+    };
+    let mut command = Command::new(program);
+    command.args(arguments).stdin(Stdio::null());
+    command.env("GAUNTLET_CONFIG", settings());
+    command
+}
+
 /// A folder for settings and profiles that no test puts any into.
 fn settings() -> PathBuf {
     Path::new(env!("CARGO_TARGET_TMPDIR")).join("no-settings")

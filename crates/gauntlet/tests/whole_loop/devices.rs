@@ -36,9 +36,9 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
     let summary = mcap::Summary::read(&bytes)
         .unwrap()
         .expect("the log has its index");
-    assert_eq!(summary.channels.len(), 14);
+    assert_eq!(summary.channels.len(), 15);
     let counts = summary.stats.unwrap().channel_message_counts;
-    // Ideal sensors have no headings to be unsure of.
+    // Ideal sensors have no headings to be unsure of, and this bridge is not on a chip.
     assert_eq!(counts.len(), 13, "what has messages: {counts:?}");
     assert_eq!(simulation.end(), Some(0));
     let log = log.to_str().unwrap();
@@ -56,6 +56,47 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
     assert!(other["command"]["max"].as_f64() > Some(0.0), "{other}");
     let driven = json(&support::run(&["replay", log, "--to", "virtual", "--json"]));
     assert!(driven["driven"]["served"].as_u64() > Some(10), "{driven}");
+    let map = support::model().to_str().unwrap();
+    let same = json(&support::run(&["replay", log, "--model", map, "--json"]));
+    assert!(
+        same["other"]["output"]["frames"].as_u64() > Some(20),
+        "{same}"
+    );
+    assert_eq!(same["other"]["output"]["max"], 0.0, "the same map: {same}");
+    let watched = support::run(&["replay", log, "--speed", "20"]);
+    let seen = text(&watched.stdout);
+    assert_eq!(watched.status.code(), Some(0), "{}", text(&watched.stderr));
+    assert!(
+        seen.contains("finger A") && seen.contains("the same"),
+        "{seen}"
+    );
+}
+
+#[test]
+fn ctrl_c_ends_a_replay_at_a_tenth_of_its_pace() {
+    let mut simulation = Simulation::start(true, true);
+    let log = simulation.folder.path().join("run.mcap");
+    let place = log.to_str().unwrap();
+    let more = [
+        "--ideal",
+        "--calibrate-flat",
+        "--seconds",
+        "2",
+        "--log",
+        place,
+    ];
+    run_owned(&teleop(&simulation.glove(), &simulation.gripper(), &more));
+    assert_eq!(simulation.end(), Some(0));
+    let words = ["replay", place, "--speed", "0.1"];
+    let (output, took) = support::told::interrupted_at("finger A", &words);
+    // Of what was seen until then nothing differs.
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    assert!(
+        text(&output.stdout).contains("0 differ"),
+        "{}",
+        text(&output.stdout)
+    );
+    assert!(took < Duration::from_secs(30), "{took:?}");
 }
 
 #[test]

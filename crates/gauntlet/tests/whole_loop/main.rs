@@ -15,6 +15,8 @@ mod devices;
 mod ends;
 mod ends_judged;
 mod every_gripper;
+mod kept_log;
+mod log_cost;
 mod own_faults;
 mod page;
 mod stalls;

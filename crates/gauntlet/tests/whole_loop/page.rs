@@ -324,7 +324,11 @@ fn driven(seconds: u32, watched: bool) -> (f64, u64, u64) {
     }
     let output = running.finish();
     let result: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    (result["latency_p99_us"].as_f64().unwrap(), memory, pictures)
+    (
+        result["run"]["latency_p99_us"].as_f64().unwrap(),
+        memory,
+        pictures,
+    )
 }
 
 /// What a page costs the loop: the median of five pairs in turns, and whether memory grows over an hour (`PAGE_SOAK` seconds).

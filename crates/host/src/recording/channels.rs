@@ -6,11 +6,12 @@ use glove::hand::Side;
 use serde_json::Value;
 
 use super::drawing::Drawn;
+use super::fields::Angles;
 use super::foxglove::{self, Entity, Level, Transform};
 use super::rates::Counting;
 use super::{cdr, fields, robot_description};
-use crate::session::record::{Frame, Record, Sort};
-use crate::session::snapshot::Status;
+use crate::session::record::{Frame, Record, Sort, Told};
+use crate::session::snapshot::{Headings, Status};
 
 /// Index into [`CHANNELS`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -28,6 +29,7 @@ pub(super) enum Channel {
     Scene,
     RobotDescription,
     Log,
+    Telemetry,
 }
 
 /// How a channel is coded.
@@ -118,7 +120,7 @@ pub(super) const JOINT_ANGLES: &str = "/glove/joint_angles";
 pub(super) const COMMAND: &str = "/gripper/command";
 
 /// In the order of [`Channel`].
-pub(super) const CHANNELS: [Description; 13] = [
+pub(super) const CHANNELS: [Description; 14] = [
     json("/glove/imu", "gauntlet.ImuFrame", fields::imu_schema),
     json(JOINT_ANGLES, "gauntlet.JointAngles", fields::angles_schema),
     json("/map/output", "gauntlet.MapOutput", fields::output_schema),
@@ -144,6 +146,11 @@ pub(super) const CHANNELS: [Description; 13] = [
         coding: Coding::Ros2(cdr::STRING_SCHEMA),
     },
     protobuf("/log", "foxglove.Log"),
+    json(
+        "/bridge/telemetry",
+        "gauntlet.Telemetry",
+        fields::telemetry_schema,
+    ),
 ];
 
 /// Least time between two messages of transforms, µs: 20 a second.
@@ -167,6 +174,8 @@ pub(super) struct Decoder {
     moved: bool,
     transforms_at: Option<u64>,
     headings_at: Option<u64>,
+    /// The newest frame of which a bridge on a chip told.
+    told: Option<u32>,
 }
 
 /// Whether so much time has gone by.
@@ -186,6 +195,7 @@ impl Decoder {
             moved: false,
             transforms_at: None,
             headings_at: None,
+            told: None,
         }
     }
 
@@ -201,6 +211,7 @@ impl Decoder {
             Record::Frame(frame) => self.frame(frame, &mut out),
             Record::Command(command) => out.push(text(Channel::Command, &fields::command(command))),
             Record::Status(status) => self.status(status, &mut out),
+            Record::Told(told) => self.told(told, &mut out),
             Record::Event {
                 sort, text: said, ..
             } => {
@@ -258,12 +269,32 @@ impl Decoder {
 
     fn frame(&mut self, frame: &Frame, out: &mut Vec<Out>) {
         out.push(text(Channel::Imu, &fields::imu(frame)));
-        out.push(text(Channel::JointAngles, &fields::joint_angles(frame)));
+        let time_us = frame.at.as_ticks();
+        let hand = Angles {
+            sequence: frame.sequence,
+            valid: frame.angles_valid,
+            held: frame.held_joints,
+            angles: &frame.angles,
+        };
+        self.angles(time_us, &hand, out);
         if let Some(output) = &frame.map_output {
             out.push(text(Channel::MapOutput, &fields::map_output(frame, output)));
         }
-        let time_us = frame.at.as_ticks();
-        if let Some(headings) = &frame.headings
+        self.headings(time_us, frame.headings.as_ref(), out);
+    }
+
+    fn angles(&mut self, time_us: u64, hand: &Angles<'_>, out: &mut Vec<Out>) {
+        let fields = fields::joint_angles(time_us, hand);
+        out.push(text(Channel::JointAngles, &fields));
+        // A hand whose angles are not known stands as it was.
+        if hand.valid && hand.angles.iter().all(|angle| angle.is_finite()) {
+            self.hand = self.moving(self.drawn.hand(hand.angles));
+            self.moved = true;
+        }
+    }
+
+    fn headings(&mut self, time_us: u64, headings: Option<&Headings>, out: &mut Vec<Out>) {
+        if let Some(headings) = headings
             && due(self.headings_at, time_us, HEADINGS_EVERY)
         {
             self.headings_at = Some(time_us);
@@ -272,16 +303,37 @@ impl Decoder {
                 &fields::headings(time_us, headings),
             ));
         }
-        // A hand whose angles are not known stands as it was.
-        if frame.angles_valid && frame.angles.iter().all(|angle| angle.is_finite()) {
-            self.hand = self.moving(self.drawn.hand(&frame.angles));
-            self.moved = true;
+    }
+
+    /// A bridge on a chip tells of a frame as often as it is asked to.
+    fn told(&mut self, told: &Told, out: &mut Vec<Out>) {
+        let (time_us, sample) = (told.at.as_ticks(), &told.sample);
+        out.push(text(Channel::Telemetry, &fields::telemetry(told)));
+        if self.told.replace(sample.frame_sequence) != Some(sample.frame_sequence) {
+            let valid = told.angles_valid && sample.is_valid() != Some(false);
+            let hand = Angles {
+                sequence: sample.frame_sequence,
+                valid,
+                held: sample.not_shown.filter(|_| valid).unwrap_or(0),
+                angles: &sample.angles,
+            };
+            self.angles(time_us, &hand, out);
         }
+        self.headings(time_us, told.headings.as_ref(), out);
+        self.place_gripper(&sample.position);
     }
 
     fn status(&mut self, status: &Status, out: &mut Vec<Out>) {
         out.push(text(Channel::Status, &fields::status(status)));
-        let counts: Vec<f32> = status.position.iter().copied().map(f32::from).collect();
+        self.place_gripper(&status.position);
+    }
+
+    /// The gripper is there, counts; nowhere that is known without any.
+    fn place_gripper(&mut self, position: &[u8]) {
+        if position.is_empty() {
+            return;
+        }
+        let counts: Vec<f32> = position.iter().copied().map(f32::from).collect();
         self.gripper = self.moving(self.drawn.gripper(&counts));
         self.moved = true;
     }

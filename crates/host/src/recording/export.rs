@@ -75,11 +75,31 @@ pub fn is_log(path: &Path) -> bool {
 /// # Errors
 /// A failure that names it: it cannot be read, is no log, or has neither joint angles nor commands.
 pub fn read(path: &Path) -> Result<Exported> {
+    read_while(path, |_, _| true)
+}
+
+/// The same as long as `go_on` says so, which is told how many bytes are behind, and of how many.
+///
+/// # Errors
+/// As [`read`]; and that it was ended.
+pub fn read_while(path: &Path, mut go_on: impl FnMut(u64, u64) -> bool) -> Result<Exported> {
     let what = || format!("the session log {}", path.display());
     let file = trainer::whole_file::read(path)
         .or_fail(what, "a log that is there and that you may read")?;
     let mut exported = Exported::default();
-    let found = salvage::read(&file, |message| exported.take(&message)).or_fail(what, record())?;
+    let (mut ended, length) = (false, file.len() as u64);
+    let found = salvage::read_while(
+        &file,
+        |message| exported.take(&message),
+        |behind| {
+            ended = !go_on(behind as u64, length);
+            !ended
+        },
+    )
+    .or_fail(what, record())?;
+    if ended {
+        return Err(Failure::interrupted(&format!("while {} was read", path.display())).into());
+    }
     exported.damage = found.damage;
     exported.finished = found.finished;
     if exported.poses.is_empty() && exported.commands.is_empty() {
@@ -269,6 +289,12 @@ impl Exported {
     /// The hand's 26 joints as OpenXR has them ([`openxr`]): `time_s`, then of each joint place (m) and orientation. And the largest
     /// difference of the angles that follow from them to those of the log, radians.
     pub fn openxr_csv(&self) -> (String, f32) {
+        // Nobody ends it.
+        self.openxr_csv_while(|_| true).unwrap_or_default()
+    }
+
+    /// The same as long as `go_on` says so, which is told how many rows are behind; `None` where it did not.
+    pub fn openxr_csv_while(&self, mut go_on: impl FnMut(usize) -> bool) -> Option<(String, f32)> {
         let mut text = String::from("time_s");
         for name in openxr::JOINTS {
             for part in ["x", "y", "z", "qx", "qy", "qz", "qw"] {
@@ -277,7 +303,10 @@ impl Exported {
         }
         text.push('\n');
         let mut worst = 0.0_f32;
-        for pose in &self.poses {
+        for (row, pose) in self.poses.iter().enumerate() {
+            if !go_on(row) {
+                return None;
+            }
             let joints = openxr::joints(&pose.angles, self.side);
             let again = openxr::angles(&joints, self.side);
             for (a, b) in again.iter().zip(&pose.angles) {
@@ -291,7 +320,7 @@ impl Exported {
             }
             text.push('\n');
         }
-        (text, worst)
+        Some((text, worst))
     }
 }
 

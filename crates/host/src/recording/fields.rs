@@ -3,12 +3,12 @@
 //! No bare arrays and no `null`: plots flatten objects by key. A number that is not finite, which JSON does not have, is the text "NaN",
 //! "Infinity" or "-Infinity"; what is not known, or does not apply, is left out.
 
-use glove::hand::{JOINT_NAMES, SEGMENT_NAMES};
+use glove::hand::{JOINT_COUNT, JOINT_NAMES, SEGMENT_NAMES};
 use serde_json::{Map, Value, json};
 use trainer::hand::Space;
 
 use super::rates::Rates;
-use crate::session::record::{AXES, Command, Frame, Sort};
+use crate::session::record::{AXES, Command, Frame, Sort, Told};
 use crate::session::snapshot::{Headings, Status};
 use crate::words;
 
@@ -37,14 +37,25 @@ pub(super) fn imu(frame: &Frame) -> Value {
     json!({ "time_us": frame.at.as_ticks(), "sequence": frame.sequence, "sensors": sensors })
 }
 
+/// The hand's angles of one frame.
+pub(super) struct Angles<'a> {
+    pub sequence: u32,
+    /// Whether they are usable.
+    pub valid: bool,
+    /// Those that are held (bit j: joint j).
+    pub held: u32,
+    /// Radians.
+    pub angles: &'a [f32; JOINT_COUNT],
+}
+
 /// `/glove/joint_angles`.
-pub(super) fn joint_angles(frame: &Frame) -> Value {
+pub(super) fn joint_angles(time_us: u64, hand: &Angles<'_>) -> Value {
     json!({
-        "time_us": frame.at.as_ticks(),
-        "sequence": frame.sequence,
-        "valid": frame.angles_valid,
-        "held": held(frame.held_joints),
-        "angles": named(&JOINT_NAMES, &frame.angles),
+        "time_us": time_us,
+        "sequence": hand.sequence,
+        "valid": hand.valid,
+        "held": held(hand.held),
+        "angles": named(&JOINT_NAMES, hand.angles),
     })
 }
 
@@ -56,6 +67,32 @@ fn held(joints: u32) -> Map<String, Value> {
         .filter(|(joint, _)| joints >> joint & 1 == 1)
         .map(|(_, name)| ((*name).to_owned(), json!(true)))
         .collect()
+}
+
+/// `/bridge/telemetry`.
+pub(super) fn telemetry(told: &Told) -> Value {
+    let sample = &told.sample;
+    let mut fields = Map::new();
+    fields.insert("time_us".to_owned(), json!(told.at.as_ticks()));
+    fields.insert("bridge_us".to_owned(), json!(sample.now_us));
+    fields.insert("state".to_owned(), json!(sample.state.to_string()));
+    let moving = sample.state.is_moving();
+    fields.insert("following".to_owned(), json!(moving));
+    let counts = |counts: &[u8]| counts.iter().copied().map(f32::from).collect::<Vec<_>>();
+    let by_axis = [
+        ("target", sample.target.to_vec()),
+        ("command", counts(&sample.command)),
+        ("position", counts(&sample.position)),
+    ];
+    for (name, values) in by_axis {
+        if !values.is_empty() {
+            let values = named(axis_names(values.len()), &values);
+            fields.insert(name.to_owned(), Value::Object(values));
+        }
+    }
+    let latency = sample.latency_us.map(|us| json!(f64::from(us) / 1e3));
+    fields.extend(latency.map(|latency| ("latency_ms".to_owned(), latency)));
+    Value::Object(fields)
 }
 
 /// `/map/output`.
@@ -264,6 +301,39 @@ pub(super) fn angles_schema(_: usize) -> Value {
                 ),
             ),
             ("angles".to_owned(), numbers(&JOINT_NAMES, "radians")),
+        ],
+    )
+}
+
+pub(super) fn telemetry_schema(axes: usize) -> Value {
+    let by_axis = |name: &str, what: &str| (name.to_owned(), numbers(axis_names(axes), what));
+    object(
+        "what a bridge on a chip tells of itself",
+        [
+            field(
+                "time_us",
+                "integer",
+                "when this computer heard it, µs since the run began",
+            ),
+            field(
+                "bridge_us",
+                "integer",
+                "the bridge's own time, µs since it started",
+            ),
+            field("state", "string", "the supervisor's state"),
+            field(
+                "following",
+                "boolean",
+                "whether the gripper follows the hand",
+            ),
+            by_axis("target", "where the hand wants the gripper, counts"),
+            by_axis("command", "what the gripper is told, counts"),
+            by_axis("position", "where the gripper is, counts"),
+            field(
+                "latency_ms",
+                "number",
+                "from the oldest sample used to the command's leaving",
+            ),
         ],
     )
 }

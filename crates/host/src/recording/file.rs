@@ -1,5 +1,6 @@
 //! The file of a session log, and what of it is whole.
 
+use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
@@ -17,6 +18,7 @@ use super::channels::{CHANNELS, Channel, Decoder};
 use super::drawing::Drawn;
 use crate::clock::Clock;
 use crate::session::record::{Record, Records};
+use crate::trace::Block;
 use crate::words::disk;
 
 /// Bytes to a chunk at most; most are closed by time.
@@ -87,6 +89,10 @@ pub(super) struct LogFile {
     decoder: Decoder,
     /// The trace's channel, and its next number.
     trace: (u16, u32),
+    /// Blocks of the trace that wait for the records from before their end: a log time stands for when something happened.
+    blocks: VecDeque<Block>,
+    /// When the newest record happened, µs.
+    recorded: u64,
     /// Log time of the newest message: it never goes back, and is never 0.
     newest: u64,
     clock: Clock,
@@ -152,6 +158,8 @@ impl LogFile {
             sequence: [0; CHANNELS.len()],
             decoder: Decoder::new(drawn),
             trace: (trace, 0),
+            blocks: VecDeque::new(),
+            recorded: 0,
             newest: 1,
             clock,
             written: Whole::default(),
@@ -167,7 +175,7 @@ impl LogFile {
     pub(super) fn write_all(&mut self, records: &Records, closing: &AtomicBool) {
         let result = self
             .write_until_end(records, closing)
-            .and_then(|()| self.write_trace(records));
+            .and_then(|()| self.write_trace(records, true));
         records.trace.close();
         self.note(&result);
     }
@@ -176,6 +184,8 @@ impl LogFile {
         let mut close = Instant::now() + CLOSE_EVERY;
         let mut sync = Instant::now() + SYNC_EVERY;
         let mut waiting = 0;
+        // What came before there was a file.
+        self.blocks.extend(records.trace.take());
         loop {
             let ends = closing.load(Ordering::Relaxed);
             let wait = match ends {
@@ -193,7 +203,8 @@ impl LogFile {
             }
             let now = Instant::now();
             if now >= close || waiting >= RECORDS {
-                self.write_trace(records)?;
+                let all = self.write_waiting(records)?;
+                self.write_trace(records, all)?;
                 self.close_chunk()?;
                 waiting = 0;
                 close = now + CLOSE_EVERY;
@@ -205,7 +216,20 @@ impl LogFile {
         }
     }
 
+    /// Writes the records that wait, as many as a chunk takes; whether none is left.
+    fn write_waiting(&mut self, records: &Records) -> McapResult<bool> {
+        for _ in 0..RECORDS {
+            match records.records.try_recv() {
+                Ok(record) => self.write(&record)?,
+                Err(_) => return Ok(true),
+            }
+        }
+        Ok(false)
+    }
+
     fn write(&mut self, record: &Record) -> McapResult<()> {
+        self.recorded = self.recorded.max(record.at().as_ticks());
+        self.write_blocks(self.recorded)?;
         let at = self.clock.wall_ns(record.at());
         for (channel, message) in self.decoder.messages(record, at) {
             self.write_message(channel, record, &message)?;
@@ -234,14 +258,24 @@ impl LogFile {
         self.newest
     }
 
-    /// Writes what waits of the trace, a message a block.
-    fn write_trace(&mut self, records: &Records) -> McapResult<()> {
-        let blocks = records.trace.take();
-        for (number, block) in blocks.iter().enumerate() {
-            if number > 0 {
+    /// Writes what waits of the trace, a message a block: `all`, or what came before the newest record.
+    fn write_trace(&mut self, records: &Records, all: bool) -> McapResult<()> {
+        self.blocks.extend(records.trace.take());
+        self.write_blocks(if all { u64::MAX } else { self.recorded })
+    }
+
+    /// Writes the blocks that end by `until`, µs.
+    fn write_blocks(&mut self, until: u64) -> McapResult<()> {
+        let mut is_first = true;
+        while self.blocks.front().is_some_and(|block| block.at <= until) {
+            let Some(block) = self.blocks.pop_front() else {
+                break;
+            };
+            if !is_first {
                 // Those of the bring-up come all at once.
                 self.close_chunk()?;
             }
+            is_first = false;
             let at = self.clock.wall_ns(Moment::from_ticks(block.at));
             let header = MessageHeader {
                 channel_id: self.trace.0,

@@ -113,16 +113,34 @@ impl SessionLog {
     /// # Errors
     /// A failure that names the path.
     pub fn create(path: &Path, drawn: Drawn, clock: Clock, records: Records) -> Result<Self> {
+        Self::create_telling(path, drawn, clock, records, |_| {})
+    }
+
+    /// The same; `tell` is told at once, by the writer's thread, why nothing is written any more.
+    ///
+    /// # Errors
+    /// As [`SessionLog::create`].
+    pub fn create_telling(
+        path: &Path,
+        drawn: Drawn,
+        clock: Clock,
+        records: Records,
+        tell: impl FnOnce(&str) + Send + 'static,
+    ) -> Result<Self> {
         let what = || format!("the session log {} cannot be written", path.display());
         let fault = Arc::new(OnceLock::new());
         let mut file =
             LogFile::create(path, drawn, clock, Arc::clone(&fault)).or_fail(what, NEXT_STEP)?;
         let closing = Arc::new(AtomicBool::new(false));
         let (lost, closed) = (records.lost(), Arc::clone(&closing));
+        let ended = Arc::clone(&fault);
         let writer = std::thread::Builder::new()
             .name("session log".to_owned())
             .spawn(move || {
                 file.write_all(&records, &closed);
+                if let Some(fault) = ended.get() {
+                    tell(fault);
+                }
                 file.finish()
             })
             .or_fail(what, "ending other programs")?;
@@ -177,6 +195,8 @@ impl Drop for SessionLog {
     }
 }
 
+#[cfg(test)]
+mod layout_tests;
 #[cfg(test)]
 mod peer_tests;
 #[cfg(test)]

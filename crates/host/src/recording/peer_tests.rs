@@ -16,7 +16,7 @@ use crate::session::snapshot::Headings;
 const SECONDS: u64 = 5;
 
 /// Five seconds of a hand and a gripper, as a session hands them over.
-fn session() -> Vec<Record> {
+pub(super) fn session() -> Vec<Record> {
     let generator = Generator::new(&LIMITS, 11);
     let mut records = Vec::new();
     for step in 0..100 * SECONDS {

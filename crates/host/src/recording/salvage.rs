@@ -8,6 +8,8 @@ use mcap::MAGIC;
 use mcap::records::{MessageHeader, Record, op};
 
 const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+/// How many times its length a damaged file is looked through at most.
+const SEARCH: usize = 8;
 /// Opcode and length.
 const FRAME: usize = 9;
 
@@ -70,7 +72,20 @@ pub struct Found {
 ///
 /// # Errors
 /// It is no MCAP file.
-pub fn read(file: &[u8], mut each: impl FnMut(Message<'_>)) -> Result<Found, NoLog> {
+pub fn read(file: &[u8], each: impl FnMut(Message<'_>)) -> Result<Found, NoLog> {
+    read_while(file, each, |_| true)
+}
+
+/// The same as long as `go_on` says so, which is told before each chunk how many bytes are behind. What comes after its `false`
+/// is no damage.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_while(
+    file: &[u8],
+    mut each: impl FnMut(Message<'_>),
+    go_on: impl FnMut(usize) -> bool,
+) -> Result<Found, NoLog> {
     if !file.starts_with(MAGIC) {
         return Err(NoLog);
     }
@@ -80,8 +95,9 @@ pub fn read(file: &[u8], mut each: impl FnMut(Message<'_>)) -> Result<Found, NoL
         schemas: BTreeMap::new(),
         channels: BTreeMap::new(),
         each: &mut each,
+        search: file.len().saturating_mul(SEARCH),
     };
-    reading.all();
+    reading.all(go_on);
     Ok(reading.found)
 }
 
@@ -96,6 +112,13 @@ struct Reading<'f, 'e> {
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Channel>,
     each: &'e mut dyn FnMut(Message<'_>),
+    /// Bytes that may still be looked through for chunks behind damage: beginnings that are none would each cost the rest of the file.
+    search: usize,
+}
+
+/// What a file says of itself, without what would command a terminal.
+fn printable(text: &str) -> String {
+    text.chars().filter(|c| !c.is_control()).take(80).collect()
 }
 
 /// The record at `offset`: opcode and where its body is; `None` where none fits.
@@ -109,9 +132,9 @@ fn framed(bytes: &[u8], offset: usize) -> Option<(u8, Range<usize>)> {
 }
 
 impl Reading<'_, '_> {
-    fn all(&mut self) {
+    fn all(&mut self, mut go_on: impl FnMut(usize) -> bool) {
         let mut offset = MAGIC.len();
-        while offset < self.file.len() {
+        while offset < self.file.len() && go_on(offset) {
             if self.file.get(offset..) == Some(MAGIC) {
                 break;
             }
@@ -142,12 +165,17 @@ impl Reading<'_, '_> {
     }
 
     /// Where the next whole chunk begins, behind something that is no record.
-    fn next_chunk(&self, from: usize) -> Option<usize> {
+    fn next_chunk(&mut self, from: usize) -> Option<usize> {
         (from..self.file.len()).find(|&offset| {
-            self.file.get(offset) == Some(&op::CHUNK)
-                && framed(self.file, offset)
-                    .and_then(|(_, body)| messages_of(self.file, body).ok())
-                    .is_some()
+            if self.file.get(offset) != Some(&op::CHUNK) {
+                return false;
+            }
+            let framed = framed(self.file, offset);
+            let Some((_, body)) = framed.filter(|(_, body)| body.len() <= self.search) else {
+                return false;
+            };
+            self.search -= body.len();
+            messages_of(self.file, body).is_ok()
         })
     }
 
@@ -177,7 +205,7 @@ impl Reading<'_, '_> {
             return;
         };
         match mcap::parse_record(code, bytes) {
-            Ok(Record::Header(header)) => self.found.program = header.library,
+            Ok(Record::Header(header)) => self.found.program = printable(&header.library),
             Ok(Record::Footer(_)) => self.found.finished = true,
             Ok(Record::Schema { header, .. }) => {
                 self.schemas.insert(header.id, header.name);

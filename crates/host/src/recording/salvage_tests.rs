@@ -63,3 +63,43 @@ fn a_whole_log_is_read_with_times_that_go_on_and_a_damaged_one_as_far_as_it_is_w
     }
     assert_eq!(read(b"no log", |_| {}), Err(NoLog));
 }
+
+#[test]
+fn beginnings_of_chunks_that_are_none_cost_no_more_than_a_few_times_the_file() {
+    // Each claims the rest of the file, and has a wrong checksum.
+    let mut file = MAGIC.to_vec();
+    file.push(0xFF);
+    file.extend([0xFF; 8]);
+    let length = 2_000_000;
+    while file.len() < length {
+        let body = (length + 64 - file.len() - FRAME) as u64;
+        file.push(op::CHUNK);
+        file.extend(body.to_le_bytes());
+        let records = body - 40;
+        file.extend([[0; 8], [0; 8], records.to_le_bytes()].concat());
+        file.extend(1_u32.to_le_bytes());
+        file.extend(0_u32.to_le_bytes());
+        file.extend(records.to_le_bytes());
+    }
+    file.resize(length + 64, 0);
+    let mut reading = Reading {
+        file: &file,
+        found: Found::default(),
+        schemas: BTreeMap::new(),
+        channels: BTreeMap::new(),
+        each: &mut |_| {},
+        search: 5_000_000,
+    };
+    assert_eq!(reading.next_chunk(MAGIC.len() + 1), None);
+    // Two of them fit, and the last ones, which are short.
+    assert!(reading.search < 1_000_000, "{}", reading.search);
+    let found = read(&file, |_| {}).unwrap();
+    assert_eq!((found.messages, found.damage.len()), (0, 1));
+}
+
+#[test]
+fn what_a_file_says_of_its_program_commands_no_terminal() {
+    let clean = printable("evil \u{1b}]0;owned\u{7}\u{1b}[2J");
+    assert_eq!(clean, "evil ]0;owned[2J");
+    assert_eq!(printable(&"x".repeat(500)).len(), 80);
+}

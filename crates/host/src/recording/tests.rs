@@ -114,7 +114,7 @@ fn assert_described(value: &Value, schema: &Value, name: &str) {
 }
 
 /// Topic → messages, read back with the field's own reader; `null` for one that is no JSON.
-fn read_back(path: &Path) -> BTreeMap<String, Vec<Value>> {
+pub(super) fn read_back(path: &Path) -> BTreeMap<String, Vec<Value>> {
     let bytes = std::fs::read(path).unwrap();
     let mut found: BTreeMap<String, Vec<Value>> = BTreeMap::new();
     for message in mcap::MessageStream::new(&bytes).unwrap() {
@@ -206,6 +206,41 @@ fn records_that_come_out_of_order_leave_no_log_time_that_goes_back() {
         "{times:?}"
     );
     assert!(!times.is_sorted_by_key(|(_, happened)| *happened));
+}
+
+#[test]
+fn what_waited_for_the_file_is_logged_at_the_times_when_it_happened() {
+    use bridge::trace::{Entry, GLOVE, Note as _};
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (feed, waiting) = queue(QUEUE);
+    let trace = feed.trace();
+    trace.note(&Entry::Head { axes: 4 });
+    // Ten seconds of bring-up.
+    for turn in 1..=1_000 {
+        trace.waited();
+        trace.clock(at(10_000 * turn));
+        let bytes = &[turn as u8; 400];
+        trace.note(&Entry::Read { port: GLOVE, bytes });
+        feed.hand(moved(10_000 * turn, |_| {}));
+    }
+    let log = SessionLog::create(&path, DRAWN, Clock::start(), waiting).unwrap();
+    let written = log.finish();
+    assert_eq!((written.lost, written.fault), (0, None));
+    let bytes = std::fs::read(&path).unwrap();
+    let (mut blocks, mut newest) = (0, 0);
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert!(message.log_time >= newest);
+        newest = message.log_time;
+        assert_eq!(
+            message.log_time, message.publish_time,
+            "{}",
+            message.channel.topic
+        );
+        blocks += u32::from(message.channel.topic == "/bridge/trace");
+    }
+    assert!(blocks > 8, "{blocks}");
 }
 
 #[test]
@@ -406,4 +441,113 @@ fn of_a_log_cut_anywhere_what_can_be_read_is_exported_and_the_rest_named() {
         }
     }
     assert!(most >= 128, "{most}");
+}
+
+/// What a bridge on a chip told of its frame `sequence`, heard at `us`.
+fn told(us: u64, sequence: u32) -> Record {
+    Record::Told(Box::new(crate::session::record::Told {
+        at: at(us),
+        sample: bridge::protocol::message::Sample {
+            now_us: 5_000_000 + us,
+            state: bridge::State::Following,
+            frame_sequence: sequence,
+            angles: [0.25; JOINT_COUNT],
+            target: [0.5, f32::NAN, 2.0, 3.0].into_iter().collect(),
+            command: [1, 2, 3, 4].into_iter().collect(),
+            position: [5, 6, 7, 8].into_iter().collect(),
+            latency_us: Some(31_500),
+            not_shown: None,
+        },
+        angles_valid: true,
+        headings: Some(crate::session::snapshot::Headings {
+            sigma: core::array::from_fn(|k| if k == 4 { f32::INFINITY } else { 0.125 }),
+            drift: [0.0; SEGMENT_COUNT],
+            degraded: 0,
+            unknown: 0,
+            poses: 0,
+            pose: None,
+        }),
+    }))
+}
+
+#[test]
+fn what_a_chip_tells_is_plotted_drawn_and_exported_with_its_own_time_beside_this_computers() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("chip.mcap");
+    let (log, _feed) = log(&path, [told(100, 3), told(20_100, 3), told(60_100, 4)]);
+    log.finish();
+    let found = read_back(&path);
+    let telemetry = &found["/bridge/telemetry"];
+    assert_eq!(telemetry.len(), 3);
+    assert_eq!(
+        (&telemetry[0]["time_us"], &telemetry[0]["bridge_us"]),
+        (&100.into(), &5_000_100.into())
+    );
+    assert_eq!(telemetry[0]["target"]["finger_a"], 0.5);
+    assert_eq!(telemetry[0]["target"]["finger_b"], "NaN");
+    assert_eq!(telemetry[0]["command"]["scissor"], 4.0);
+    assert_eq!(telemetry[0]["position"]["finger_c"], 7.0);
+    assert_eq!(telemetry[0]["latency_ms"], 31.5);
+    assert_eq!(
+        (&telemetry[0]["state"], &telemetry[0]["following"]),
+        (&bridge::State::Following.to_string().into(), &true.into())
+    );
+    // A frame of which it tells twice is one, headings come once a second, and the hand is drawn.
+    assert_eq!(found["/glove/joint_angles"].len(), 2);
+    let sigma = &found["/glove/headings"][0]["sigma"];
+    assert_eq!(
+        (&sigma["index_proximal"], &sigma["hand"]),
+        (&"Infinity".into(), &0.125.into())
+    );
+    assert_eq!(found["/glove/headings"].len(), 1);
+    assert_eq!(found["/tf"].len(), 2);
+    assert!(!found.contains_key("/glove/imu") && !found.contains_key("/gripper/command"));
+    let exported = export::read(&path).unwrap();
+    assert_eq!(exported.poses.len(), 2);
+    assert_eq!(exported.poses[1].angles, [0.25; JOINT_COUNT]);
+}
+
+#[test]
+fn of_a_log_that_ends_well_its_writer_tells_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let (feed, waiting) = queue(QUEUE);
+    let (tell, told) = std::sync::mpsc::channel();
+    let path = folder.path().join("run.mcap");
+    let log = SessionLog::create_telling(&path, DRAWN, Clock::start(), waiting, move |why| {
+        let _ = tell.send(why.to_owned());
+    })
+    .unwrap();
+    feed.hand(frame(0));
+    let written = log.finish();
+    assert_eq!(written.fault, None);
+    assert!(told.try_recv().is_err(), "nothing is wrong with it");
+}
+
+#[test]
+fn a_log_is_read_as_long_as_the_reader_wants() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("run.mcap");
+    let (log, _feed) = log(&path, (0..600).map(frame));
+    log.finish();
+    let length = path.metadata().unwrap().len();
+    let mut behind = Vec::new();
+    let whole = export::read_while(&path, |bytes, of| {
+        behind.push(bytes);
+        assert_eq!(of, length);
+        true
+    });
+    assert_eq!(whole.unwrap(), export::read(&path).unwrap());
+    assert!(behind.len() > 4 && behind.is_sorted(), "{behind:?}");
+    let ended = export::read_while(&path, |bytes, _| bytes < length / 2);
+    let error = ended.unwrap_err().to_string();
+    assert!(
+        error.contains("interrupted") && error.contains("run.mcap"),
+        "{error}"
+    );
+    let exported = export::read(&path).unwrap();
+    assert_eq!(exported.openxr_csv_while(|row| row < 5), None);
+    assert_eq!(
+        exported.openxr_csv_while(|_| true),
+        Some(exported.openxr_csv())
+    );
 }

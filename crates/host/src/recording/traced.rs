@@ -1,6 +1,6 @@
 //! The trace in a session log: its blocks put together again, up to the first one that is missing.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::Result;
 use bridge::trace::{Entry, Part, Reader};
@@ -16,6 +16,8 @@ use crate::trace::Home;
 /// A trace from a log, and what the bridge was made of.
 #[derive(Debug, Clone)]
 pub struct Traced {
+    /// The log.
+    pub path: PathBuf,
     /// What was found in the file.
     pub found: Found,
     /// What the bridge's home said of itself.
@@ -104,14 +106,15 @@ impl Traced {
             )
             .into());
         }
-        Self::of(blocks, found, what)
+        Self::of(path, blocks, found, what)
     }
 
-    fn of(blocks: Blocks, found: Found, what: impl Fn() -> String) -> Result<Self> {
+    fn of(path: &Path, blocks: Blocks, found: Found, what: impl Fn() -> String) -> Result<Self> {
         let Blocks {
             bytes, end, gap, ..
         } = blocks;
         let mut traced = Self {
+            path: path.to_owned(),
             found,
             home: Home::unknown(),
             model: Model::ThreeFinger,

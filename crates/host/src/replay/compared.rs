@@ -3,7 +3,7 @@
 use anyhow::Result;
 use bridge::{App, Board};
 
-use super::{Changes, Follow, other, same};
+use super::{Both, Changes, Follow, other, same};
 use crate::recording::traced::Traced;
 use crate::session::axes::Axes;
 
@@ -17,14 +17,21 @@ struct Moment {
 }
 
 #[derive(Debug, Default)]
-struct Moments(Vec<Moment>);
+struct Moments {
+    all: Vec<Moment>,
+    /// Time of the newest turn, µs.
+    at: u64,
+    /// After which there is nothing to compare with, µs.
+    until: Option<u64>,
+}
 
 impl Follow for Moments {
     fn turn<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>, at: u64) -> bool {
+        self.at = at;
         let seen = app.telemetry();
-        let newest = self.0.last().map_or(0, |moment| moment.frame);
+        let newest = self.all.last().map_or(0, |moment| moment.frame);
         if seen.frame_sequence != newest {
-            self.0.push(Moment {
+            self.all.push(Moment {
                 frame: seen.frame_sequence,
                 at,
                 output: seen.map_output.map(Into::into),
@@ -34,7 +41,7 @@ impl Follow for Moments {
                     .map(|command| command.position.map(f32::from).into()),
             });
         }
-        true
+        self.until.is_none_or(|until| at <= until)
     }
 }
 
@@ -67,24 +74,28 @@ pub struct Compared {
     pub command: Apart,
 }
 
-/// Replays the log with its own bridge and with another one.
+/// Replays the log with its own bridge and with another one; `follow` sees the turns of both, one after the other.
 ///
 /// # Errors
 /// As [`same`].
-pub fn compare(traced: &Traced, changes: &Changes) -> Result<Compared> {
-    let (mut ours, mut theirs) = (Moments::default(), Moments::default());
-    same(traced, &mut ours)?;
-    other(traced, changes, &mut theirs)?;
-    let mut theirs = theirs.0.iter().peekable();
+pub fn compare(traced: &Traced, changes: &Changes, follow: &mut impl Follow) -> Result<Compared> {
+    let mut ours = Moments::default();
+    same(traced, &mut Both(&mut ours, follow))?;
+    let mut theirs = Moments {
+        until: Some(ours.at),
+        ..Moments::default()
+    };
+    other(traced, changes, &mut Both(&mut theirs, follow))?;
+    let mut theirs = theirs.all.iter().peekable();
     let (mut output, mut command) = (Sum::default(), Sum::default());
-    for our in &ours.0 {
+    for our in &ours.all {
         while theirs.next_if(|their| their.frame < our.frame).is_some() {}
         let their = theirs.peek().filter(|their| their.frame == our.frame);
         output.add(our.at, our.output, their.and_then(|their| their.output));
         command.add(our.at, our.command, their.and_then(|their| their.command));
     }
     Ok(Compared {
-        frames: ours.0.len() as u64,
+        frames: ours.all.len() as u64,
         output: output.apart(),
         command: command.apart(),
     })

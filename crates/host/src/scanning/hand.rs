@@ -54,6 +54,7 @@ pub enum Flat {
 /// A hand whose glove is read.
 #[derive(Debug, Clone)]
 pub struct Hand {
+    side: Side,
     posture: Posture,
     flat: Flat,
     /// The flat pose under way, and when its time is over.
@@ -74,6 +75,7 @@ impl Hand {
     /// A glove whose sensors sit straight on their segments and share one heading.
     pub fn ideal(side: Side) -> Self {
         Self {
+            side,
             posture: Posture::new(side, None),
             flat: Flat::None,
             pose: None,
@@ -88,6 +90,11 @@ impl Hand {
         let mut hand = Self::ideal(profile.profile.side);
         hand.posture.set_profile(Some(profile));
         hand
+    }
+
+    /// Which hand it is.
+    pub fn side(&self) -> Side {
+        self.side
     }
 
     /// From `now` on the hand lies flat: taken as soon as it was still for a second, within `wait`.

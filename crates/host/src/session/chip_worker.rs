@@ -12,6 +12,7 @@ use bridge::protocol::message::{Counters, Sample, Status};
 
 use super::axes::Axes;
 use super::chip_devices::Told;
+use super::chip_kept::Kept;
 use super::chip_stop::{Known, renew, stop};
 use super::hub::Hub;
 use super::orders::{Order, Queue};
@@ -63,6 +64,7 @@ pub(super) struct Worker {
     orders: Queue,
     pub(super) hub: Hub,
     samples: Option<SyncSender<Sample>>,
+    kept: Option<Kept>,
     /// Of the closing that is kept.
     epoch: Option<Epoch>,
     /// The clutch was closed, or the gripper told to activate, by this session.
@@ -91,8 +93,8 @@ impl Worker {
         orders: Queue,
         hub: Hub,
         samples: Option<SyncSender<Sample>>,
-        status: Status,
-        counters: Counters,
+        kept: Option<Kept>,
+        (status, counters): (Status, Counters),
     ) -> Self {
         let now = Instant::now();
         hub.lock().totals = Totals::on_chip(&counters, now);
@@ -101,6 +103,7 @@ impl Worker {
             orders,
             hub,
             samples,
+            kept,
             epoch: None,
             touched: false,
             activation_asked: false,
@@ -211,6 +214,10 @@ impl Worker {
             let blocked = |axis| self.devices.is_blocked(axis);
             self.hub.lock().sample(&sample, self.clutch, blocked);
             self.devices.sample(&sample);
+            if let Some(kept) = &self.kept {
+                let valid = self.status.glove_answers && !self.useless;
+                kept.sample(&sample, valid, self.devices.headings());
+            }
             if let Some(samples) = &self.samples {
                 // Who keeps them and is slow, or gone, says so.
                 let _ = samples.try_send(sample.clone());
@@ -368,6 +375,9 @@ impl Worker {
         let newest = self.sample.as_ref();
         let sample = newest.filter(|sample| sample.now_us >= status.now_us);
         let state = sample.map_or(status.state, |sample| sample.state);
+        if let Some(kept) = &mut self.kept {
+            kept.status(state, status.now_us, self.devices.gripper());
+        }
         // An activation that has ended is over, whatever the gripper does later: none other is moved.
         self.activation_asked &= !state.is_moving();
         let mut calibration = self.calibration;

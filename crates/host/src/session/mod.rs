@@ -19,6 +19,7 @@ pub mod axes;
 mod calibrating;
 mod chip_calibrating;
 mod chip_devices;
+mod chip_kept;
 mod chip_stop;
 mod chip_worker;
 mod devices;

@@ -87,6 +87,8 @@ impl Numbers {
                 self.look_for_motion(status.stamp, status.position);
                 self.obeyed.status(status, self.told.as_deref());
             }
+            // A chip's numbers are counted as they come.
+            Record::Told(_) => {}
             Record::Event {
                 sort, text, kind, ..
             } => {

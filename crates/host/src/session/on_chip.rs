@@ -10,10 +10,12 @@ use std::thread::JoinHandle;
 use anyhow::Result;
 use bridge::protocol::message::Sample;
 
+use super::chip_kept::Kept;
 use super::chip_stop::SAMPLE_MS;
 use super::chip_worker::{Left, Worker};
 use super::hub::Hub;
 use super::orders::{Order, Orders};
+use super::record::Feed;
 use super::stopped::Stopped;
 use super::{Session, goes_on};
 use crate::chip::link::{Address, Error, HostLink};
@@ -32,7 +34,7 @@ pub struct OnChip {
 
 impl OnChip {
     /// Begins to watch the bridge behind `link`. Nothing moves, and who else drives it is not disturbed. `samples`: who is
-    /// handed every telemetry sample.
+    /// handed every telemetry sample. `feed`: who keeps a log of what the bridge tells.
     ///
     /// # Errors
     /// The line's fault, or the system gives no thread.
@@ -40,6 +42,7 @@ impl OnChip {
         mut link: HostLink,
         clock: Clock,
         samples: Option<SyncSender<Sample>>,
+        feed: Option<Feed>,
     ) -> Result<Self> {
         let address = link.address().clone();
         let told = |error: Error| error.at(&address);
@@ -53,7 +56,9 @@ impl OnChip {
         link.telemetry(SAMPLE_MS).map_err(told)?;
         let (orders, queue) = Orders::queue(clock);
         let hub = Hub::default();
-        let mut worker = Worker::new(link, queue, hub.clone(), samples, status, counters);
+        let kept = feed.map(|feed| Kept::new(feed, clock));
+        let told = (status, counters);
+        let mut worker = Worker::new(link, queue, hub.clone(), samples, kept, told);
         if let Some(calibration) = calibration {
             worker.knows(calibration.is_calibrated);
         }

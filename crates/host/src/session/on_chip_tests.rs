@@ -18,7 +18,7 @@ const BEAT: Duration = Duration::from_millis(50);
 
 fn watching(bridge: &Scripted) -> OnChip {
     let link = HostLink::connect(&bridge.address()).unwrap();
-    OnChip::start(link, Clock::start(), None).unwrap()
+    OnChip::start(link, Clock::start(), None, None).unwrap()
 }
 
 /// Keeps the clutch closed until it is so.
@@ -344,4 +344,41 @@ fn an_axis_that_stood_before_the_run_began_and_stands_is_told() {
     until(&session, stood);
     session.hub().begin();
     until(&session, stood);
+}
+
+#[test]
+fn what_a_bridge_on_a_chip_tells_is_handed_to_who_keeps_it_at_this_computers_time() {
+    use super::record::{Record, queue};
+    let bridge = Scripted::start();
+    let link = HostLink::connect(&bridge.address()).unwrap();
+    let clock = Clock::start();
+    let (feed, records) = queue(10_000);
+    let session = OnChip::start(link, clock, None, Some(feed)).unwrap();
+    assert!(session.order(Order::Engage));
+    until(&session, |seen| seen.state == State::Following);
+    drop(session);
+    let kept: Vec<Record> = records.records.iter().collect();
+    let end = clock.now();
+    assert!(
+        kept.iter().all(|record| record.at() <= end),
+        "the bridge's own time"
+    );
+    let count = |what: fn(&Record) -> bool| kept.iter().filter(|record| what(record)).count();
+    assert!(count(|record| matches!(record, Record::Told(_))) > 0);
+    assert!(count(|record| matches!(record, Record::Status(_))) > 0);
+    let events: Vec<&String> = kept
+        .iter()
+        .filter_map(|record| match record {
+            Record::Event { text, .. } => Some(text),
+            _ => None,
+        })
+        .collect();
+    let follows = State::Following.to_string();
+    assert!(
+        events.iter().any(|text| text.contains(&follows)),
+        "{events:?}"
+    );
+    // The same status is told once.
+    let statuses = count(|record| matches!(record, Record::Status(_)));
+    assert!(statuses < 100, "{statuses}");
 }

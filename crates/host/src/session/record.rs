@@ -1,8 +1,9 @@
 //! What a run hands to whoever watches it: frames, commands, statuses and events, each exactly once.
 
 use bridge::event::Kind;
+use bridge::protocol::message::Sample;
 use glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
-use glove::scan::Health;
+use glove::scan::{self, Health};
 use gripper::Instant;
 
 use std::sync::Arc;
@@ -31,6 +32,17 @@ pub struct Imu {
     pub health: Health,
 }
 
+impl From<&scan::Sample> for Imu {
+    fn from(sample: &scan::Sample) -> Self {
+        let quaternion = sample.orientation.as_ref();
+        Self {
+            quaternion: [quaternion.w, quaternion.i, quaternion.j, quaternion.k],
+            stamp: sample.stamp,
+            health: sample.health,
+        }
+    }
+}
+
 /// One frame of the glove and what the bridge made of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
@@ -54,6 +66,30 @@ pub struct Frame {
     pub headings: Option<Headings>,
 }
 
+impl Frame {
+    /// Of a scan at `at` that no bridge took: nothing is made of it but the hand's angles (radians) and which of them are held (bit j: joint
+    /// j), where they are anybody's.
+    pub fn of_scan(
+        at: Instant,
+        scan: &scan::Frame,
+        hand: Option<([f32; JOINT_COUNT], u32)>,
+        headings: Option<Headings>,
+    ) -> Self {
+        let (angles, held_joints) = hand.unwrap_or_default();
+        Self {
+            at,
+            sequence: scan.sequence,
+            imus: scan.samples.map(|sample| Imu::from(&sample)),
+            angles,
+            angles_valid: hand.is_some(),
+            held_joints,
+            map_output: None,
+            following: false,
+            headings,
+        }
+    }
+}
+
 /// One command that left for the gripper.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Command {
@@ -65,6 +101,19 @@ pub struct Command {
     pub age_us: Option<u64>,
     /// Whether it is the first one that rests on that sample: its age is the latency of that frame.
     pub first: bool,
+}
+
+/// What a bridge on a chip tells of itself at a time.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Told {
+    /// When this computer heard it; the sample has the bridge's own time.
+    pub at: Instant,
+    /// What it tells.
+    pub sample: Sample,
+    /// Whether its joint angles are usable.
+    pub angles_valid: bool,
+    /// What is known of the headings; `None` without a profile, and where the bridge does not say.
+    pub headings: Option<Headings>,
 }
 
 /// Sorts of events that somebody acts on.
@@ -85,6 +134,8 @@ pub enum Record {
     Command(Command),
     /// A status of the gripper.
     Status(Status),
+    /// What a bridge on a chip tells, in the place of frames and commands.
+    Told(Box<Told>),
     /// Something that happened, in words.
     Event {
         /// When.
@@ -105,6 +156,7 @@ impl Record {
             Self::Frame(frame) => frame.at,
             Self::Command(command) => command.at,
             Self::Status(status) => status.stamp,
+            Self::Told(told) => told.at,
             Self::Event { at, .. } => *at,
         }
     }

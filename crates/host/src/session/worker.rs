@@ -290,7 +290,7 @@ fn hold_confirmed<const X: usize>(
 }
 
 /// Whether an event is something wrong, or merely something that happened.
-fn sort(kind: &Kind) -> Sort {
+pub(super) fn sort(kind: &Kind) -> Sort {
     let fault = match kind {
         // A hold is a fault where it ends motion; which reason follows which is only told.
         Kind::State { from, to } => match to {
@@ -320,18 +320,10 @@ fn sort(kind: &Kind) -> Sort {
 
 fn frame_record<const X: usize>(telemetry: &Telemetry<X>) -> Option<Frame> {
     let frame = telemetry.frame.as_ref()?;
-    let imus = frame.samples.map(|sample| {
-        let quaternion = sample.orientation.as_ref();
-        Imu {
-            quaternion: [quaternion.w, quaternion.i, quaternion.j, quaternion.k],
-            stamp: sample.stamp,
-            health: sample.health,
-        }
-    });
     Some(Frame {
         at: telemetry.now,
         sequence: frame.sequence,
-        imus,
+        imus: frame.samples.map(|sample| Imu::from(&sample)),
         angles: telemetry.angles,
         angles_valid: telemetry.angles_valid,
         held_joints: telemetry.held_joints,

@@ -6,15 +6,13 @@ use std::time::Duration;
 use anyhow::Result;
 
 use super::args::BridgeAt;
-use super::drive::{Kept, drive, finish, start};
+use super::drive::{Kept, drive, finish, start, start_logged};
 use super::poses::{self, PassedOver};
-use crate::line_log::LineLog;
 use crate::outputs;
 use crate::results::runs;
 use crate::tell::Tell;
 use crate::web::{Page, ViewOptions};
 use host::bridge::protocol::message::Health;
-use host::clock::Clock;
 use host::failure::{Failure, with_others};
 use host::interrupt::Interrupt;
 use host::recording::poses::PosesFile;
@@ -27,17 +25,16 @@ pub(super) fn monitor(
     interrupt: &Interrupt,
 ) -> Result<()> {
     let page = Page::start(view, &Tell::new(at.json))?;
-    let mut log = LineLog::new(log)?;
-    let mut link = at.connect()?;
-    let clock = Clock::start();
-    // The bytes of the chip's own ports do not fit this line: 17 kB/s into 11.5 kB/s.
-    log.trace().begin_monitor();
-    link.keep(log.trace(), clock);
-    let mut run = start(link, None, at.devices(), interrupt)?;
+    if let Some(path) = log {
+        outputs::check_new(path, "a log")?;
+    }
+    let link = at.connect()?;
+    let mut run = match log {
+        Some(path) => start_logged(link, path, at.devices(), interrupt)?,
+        None => start(link, None, at.devices(), interrupt)?,
+    };
     run.shows(page, None);
-    log.begin(clock)?;
     let driven = drive(&mut run, "gauntlet bridge monitor", seconds, false, at.json);
-    let driven = driven.and(log.finish(&Tell::new(at.json)));
     finish("bridge monitor", at, run.finish(), Kept::nothing(), driven)
 }
 

@@ -19,6 +19,7 @@ use host::failure::Failure;
 use host::interrupt::Interrupt;
 use host::next::Command;
 use host::scanning::{Scanned, Scanning};
+use host::session::record::{Feed, Frame, Record};
 use host::words;
 
 /// For the sensors of a chip that has just started.
@@ -78,8 +79,13 @@ impl Place<'_> {
             Self::Port(at) => {
                 let clock = Clock::start();
                 let (scanning, missing) = at.read(tell, clock, log.trace(), interrupt)?;
-                log.begin(clock)?;
-                return Ok((Source::Port { scanning, clock }, missing));
+                log.begin(clock, at.side(), interrupt)?;
+                let source = Source::Port {
+                    scanning,
+                    clock,
+                    feed: log.feed(),
+                };
+                return Ok((source, missing));
             }
             Self::Chip(address) => *address,
         };
@@ -114,8 +120,12 @@ impl Place<'_> {
 
 /// Where the scans come from.
 pub(in crate::commands) enum Source {
-    /// A glove at a port of this computer, read with stamps of this clock.
-    Port { scanning: Scanning, clock: Clock },
+    /// A glove at a port of this computer, read with stamps of this clock, and where its scans are logged.
+    Port {
+        scanning: Scanning,
+        clock: Clock,
+        feed: Option<Feed>,
+    },
     /// That of a bridge on a chip, with stamps of the chip's clock.
     Chip { scans: Box<Scans>, address: Address },
 }
@@ -150,9 +160,16 @@ impl Source {
     /// What ended the reading.
     pub fn next(&mut self, time: Duration) -> Result<Option<Scanned>> {
         match self {
-            Self::Port { scanning, .. } => match scanning.next(time) {
+            Self::Port { scanning, feed, .. } => match scanning.next(time) {
                 None if !scanning.running() => Err(scanning.ended()),
-                scanned => Ok(scanned),
+                scanned => {
+                    if let (Some(feed), Some(scan)) = (feed, &scanned) {
+                        // Whose angles they are is what a calibration is to find out.
+                        let frame = Frame::of_scan(scan.at, &scan.frame, None, None);
+                        feed.hand(Record::Frame(Box::new(frame)));
+                    }
+                    Ok(scanned)
+                }
             },
             Self::Chip { scans, address } => Ok(scans.next(time).map_err(|e| e.at(address))?),
         }

@@ -116,7 +116,11 @@ fn shown(stage: Stage<'_>, devices: &Virtual) -> Result<(Bound, Person)> {
         ..Leading::default()
     };
     let person = Listener::Here(devices.glove.clone());
-    let source = Source::Port { scanning, clock };
+    let source = Source::Port {
+        scanning,
+        clock,
+        feed: None,
+    };
     let mut session = Session::new(source, leading, Some(person));
     let led = session.lead(tell, interrupt);
     let done = session.finish();

@@ -7,11 +7,13 @@ use host::trainer::whole_file;
 
 use super::args::Export;
 use crate::outputs;
+use crate::progress::Progress;
 use crate::results::{self, recordings};
 use crate::tell::Tell;
 use host::failure::{Failure, OrFail};
+use host::interrupt::Interrupt;
 use host::next::Command;
-use host::recording::export;
+use host::recording::export::{self, Exported};
 
 /// Where the tables go.
 struct Tables {
@@ -45,7 +47,7 @@ impl Tables {
     }
 }
 
-pub(super) fn run(options: &Export) -> Result<()> {
+pub(super) fn run(options: &Export, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     let tables = Tables::of(options);
     let mut taken: Vec<&Path> = Vec::new();
@@ -60,11 +62,15 @@ pub(super) fn run(options: &Export) -> Result<()> {
         }
         taken.push(path);
     }
-    let log = export::read(&options.file)?;
+    let log = read(options, interrupt)?;
     // Asked for by name, an empty one is none.
     if options.poses.is_some() || options.openxr.is_some() {
         log.require_poses(&options.file)?;
     }
+    let mut hand = match &tables.openxr {
+        Some(_) => Some(openxr(&log, options, interrupt)?),
+        None => None,
+    };
     let mut error = None;
     let mut written = Vec::new();
     let (poses, commands) = (log.poses.len(), log.commands.len());
@@ -81,7 +87,7 @@ pub(super) fn run(options: &Export) -> Result<()> {
         log.commands_csv()
     })?;
     make("openxr", &tables.openxr, poses, &mut || {
-        let (text, worst) = log.openxr_csv();
+        let (text, worst) = hand.take().unwrap_or_default();
         error = Some(worst.to_degrees());
         text
     })?;
@@ -107,6 +113,28 @@ pub(super) fn run(options: &Export) -> Result<()> {
         ));
     }
     Ok(())
+}
+
+/// Reads the log, under a bar.
+fn read(options: &Export, interrupt: &Interrupt) -> Result<Exported> {
+    let mut bar = None;
+    export::read_while(&options.file, |behind, of| {
+        bar.get_or_insert_with(|| Progress::start("reading", of, options.json))
+            .at(behind, || {
+                format!("{:.0} MB of the log", behind as f64 / 1e6)
+            });
+        !interrupt.asked()
+    })
+}
+
+/// The hand as OpenXR has it, under a bar, since of a long log that takes a while; and how far its angles are from the log's, radians.
+fn openxr(log: &Exported, options: &Export, interrupt: &Interrupt) -> Result<(String, f32)> {
+    let mut bar = Progress::start("openxr", log.poses.len() as u64, options.json);
+    let made = log.openxr_csv_while(|row| {
+        bar.at(row as u64, || format!("{row} poses"));
+        !interrupt.asked()
+    });
+    made.ok_or_else(|| Failure::interrupted("before any table was written").into())
 }
 
 fn write(path: &Path, text: &str) -> Result<()> {

@@ -77,10 +77,12 @@ pub(crate) fn run(options: &Record, interrupt: &Interrupt) -> Result<()> {
     }
     // A full disk is the writer's to tell.
     interrupt.look_after_file_limit();
-    log.begin(clock)?;
+    log.begin(clock, hand.side(), interrupt)?;
     let (file, rows) = PosesFile::create(&options.out, interrupt, Some)?;
+    let side = hand.side();
     let mut session = Session::new(scanning, hand, rows, options.at.json);
-    session.shows(page, options.at.side());
+    session.shows(page, side);
+    session.keeps(log.feed());
     let recorded = match options.seconds {
         Some(time) => session.free(time, interrupt),
         None => session.guided(interrupt),

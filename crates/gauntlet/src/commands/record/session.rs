@@ -13,6 +13,7 @@ use crate::web::{self, Page, Picture};
 use host::interrupt::Interrupt;
 use host::recording::poses::Row;
 use host::scanning::{Hand, Scanned, Scanning};
+use host::session::record::{Feed, Frame, Record};
 use host::stats::short_or_dash;
 use host::training::movements::Movements;
 use host::training::prompts::{GUIDED, Prompt, again, free};
@@ -56,6 +57,8 @@ pub(super) struct Session {
     side: Side,
     began: Instant,
     angles: [f32; JOINT_COUNT],
+    /// Where scans are logged.
+    feed: Option<Feed>,
 }
 
 impl Session {
@@ -76,7 +79,13 @@ impl Session {
             side: Side::Right,
             began: Instant::now(),
             angles: [0.0; JOINT_COUNT],
+            feed: None,
         }
+    }
+
+    /// Hands every scan to a log, too.
+    pub fn keeps(&mut self, feed: Option<Feed>) {
+        self.feed = feed;
     }
 
     /// Shows all of it on `page`, too.
@@ -162,6 +171,12 @@ impl Session {
         self.newest = Instant::now();
         let pose = self.hand.take(scan);
         self.angles = pose.angles;
+        if let Some(feed) = &self.feed {
+            let calibrated = self.hand.is_calibrated();
+            let angles = calibrated.then_some((pose.angles, pose.held));
+            let frame = Frame::of_scan(scan.at, &scan.frame, angles, self.hand.headings());
+            feed.hand(Record::Frame(Box::new(frame)));
+        }
         if !pose.is_whole() {
             self.passed_over += 1;
             return;

@@ -15,7 +15,7 @@ use crate::tell::Tell;
 use host::calibration::profile_file::Kept;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
-use host::next::advice;
+use host::next::{Command, advice};
 use host::recording::traced::Traced;
 use host::replay::{self, Changes, Follow, Same};
 use host::session::check_image;
@@ -36,27 +36,49 @@ pub(crate) fn run(options: &Replay, interrupt: &Interrupt) -> Result<()> {
             options.file.display()
         ));
     }
+    if traced.is_scan() && (options.changes() || options.to.is_some()) {
+        return Err(Failure::usage(
+            format!(
+                "{} is the log of a glove that was read by itself: no map and no gripper took part",
+                options.file.display()
+            ),
+            Command::gauntlet("replay").word(options.file.display().to_string()),
+        )
+        .into());
+    }
     let changes = changes(options, &traced)?;
     let started = Instant::now();
     let same = match options.speed {
         Some(speed) => watched::run(traced.clone(), speed, options.json, interrupt)?,
         None => {
-            let mut bar = Bar {
-                shown: Progress::start("replay", traced.end, options.json),
-                interrupt,
-            };
-            let same = replay::same(&traced, &mut bar)?;
-            bar.shown.finish();
-            same
+            let mut bar = Bar::new("replay", traced.end, options, interrupt);
+            replay::same(&traced, &mut bar)?
         }
     };
     let took = started.elapsed();
-    let mut result = replays::Replayed::new(&options.file, &traced, &same, took);
-    if let Some(changes) = &changes {
-        result.other = Some(replay::compare(&traced, changes)?.into());
+    let ended = interrupt.asked();
+    // A view that somebody closes has been seen as far as they liked.
+    if ended && options.speed.is_none() {
+        let until = format!("after {:.1} s of the log", same.time_us as f64 * 1e-6);
+        return Err(Failure::interrupted(&until).into());
     }
-    if options.to == Some(Target::Virtual) {
-        result.driven = Some(on_virtual::drive(&traced, options.speed, interrupt)?);
+    let mut result = replays::Replayed::new(&options.file, &traced, &same, took);
+    if let Some(changes) = changes.as_ref().filter(|_| !ended) {
+        let mut bar = Bar::new(
+            "comparison",
+            traced.end.saturating_mul(2),
+            options,
+            interrupt,
+        );
+        result.other = Some(replay::compare(&traced, changes, &mut bar)?.into());
+    }
+    if options.to == Some(Target::Virtual) && !ended {
+        let mut bar = Bar::new("commands", traced.end, options, interrupt);
+        let driven = on_virtual::drive(&traced, options.speed, &mut bar, interrupt)?;
+        result.driven = Some(driven);
+    }
+    if interrupt.asked() && !ended {
+        return Err(Failure::interrupted("before the end of the log").into());
     }
     result.lines(|line| tell.say(format_args!("{line}")));
     let (judgement, failure) = results::judged(judge(options, &same));
@@ -71,12 +93,35 @@ pub(crate) fn run(options: &Replay, interrupt: &Interrupt) -> Result<()> {
 struct Bar<'i> {
     shown: Progress,
     interrupt: &'i Interrupt,
+    /// Time of the newest turn, and of all that came before it started from 0 anew, µs.
+    newest: u64,
+    before: u64,
+}
+
+impl<'i> Bar<'i> {
+    fn new(what: &'static str, total_us: u64, options: &Replay, interrupt: &'i Interrupt) -> Self {
+        Self {
+            shown: Progress::start(what, total_us, options.json),
+            interrupt,
+            newest: 0,
+            before: 0,
+        }
+    }
 }
 
 impl Follow for Bar<'_> {
     fn turn<B: Board<X>, const X: usize>(&mut self, _: &mut App<B, X>, at: u64) -> bool {
-        self.shown
-            .at(at, || format!("{:.0} s of the log", at as f64 * 1e-6));
+        self.reading(at)
+    }
+
+    fn reading(&mut self, at: u64) -> bool {
+        if at < self.newest {
+            self.before = self.before.saturating_add(self.newest);
+        }
+        self.newest = at;
+        self.shown.at(self.before.saturating_add(at), || {
+            format!("{:.0} s of the log", at as f64 * 1e-6)
+        });
         !self.interrupt.asked()
     }
 }

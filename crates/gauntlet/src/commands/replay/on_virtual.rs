@@ -11,7 +11,7 @@ use crate::results::replays::Driven;
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::recording::traced::Traced;
-use host::replay;
+use host::replay::{self, Follow};
 
 /// The gripper moves on so long after the last request.
 const SETTLES: u64 = 1_000_000;
@@ -21,7 +21,12 @@ const SETTLES: u64 = 1_000_000;
 ///
 /// # Errors
 /// A failure where the log's trace cannot be read.
-pub(super) fn drive(traced: &Traced, speed: Option<f64>, interrupt: &Interrupt) -> Result<Driven> {
+pub(super) fn drive(
+    traced: &Traced,
+    speed: Option<f64>,
+    follow: &mut impl Follow,
+    interrupt: &Interrupt,
+) -> Result<Driven> {
     let family = match traced.model {
         Model::ThreeFinger => Family::ThreeFinger,
         Model::TwoFinger85 => Family::TwoFinger85,
@@ -42,7 +47,7 @@ pub(super) fn drive(traced: &Traced, speed: Option<f64>, interrupt: &Interrupt) 
     let gripper = VirtualGripper::new(config);
     gripper.preset_active();
     let mut line = MemoryWire::new(&clock, gripper.clone(), baud);
-    let log = replay::gripper_line(traced);
+    let log = replay::gripper_line(traced, follow);
     let started = Instant::now();
     let mut newest = 0;
     for (at, request) in &log.requests {
