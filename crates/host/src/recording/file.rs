@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 use std::fs::File;
 use std::io::{self, Seek, SeekFrom, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::RecvTimeoutError;
@@ -301,9 +302,26 @@ impl LogFile {
 
     fn close_chunk(&mut self) -> McapResult<()> {
         self.writer.flush()?;
+        let bytes = self.file.stream_position()?;
+        if let Some(what) = self.taken(bytes)? {
+            self.whole = Whole::default();
+            return Err(io::Error::other(what).into());
+        }
         self.whole = self.written;
-        self.whole.bytes = self.file.stream_position()?;
+        self.whole.bytes = bytes;
         Ok(())
+    }
+
+    /// What another program did to the file, which should have `bytes`.
+    fn taken(&self, bytes: u64) -> io::Result<Option<&'static str>> {
+        let found = self.file.metadata()?;
+        Ok(if found.nlink() == 0 {
+            Some("another program removed it")
+        } else if found.len() < bytes {
+            Some("another program cut it short")
+        } else {
+            None
+        })
     }
 
     /// Writes the index; where the file takes nothing more, lets it end after its last whole chunk.

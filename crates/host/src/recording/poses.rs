@@ -72,7 +72,10 @@ impl PosesFile {
     /// where one could not be written. A file without one is taken away: it would stand in the way of the same command again.
     pub fn finish(self) -> (u64, Result<()>) {
         let stopped = || (0, Err(std::io::Error::other("its writer stopped")));
-        let (count, written) = self.writer.join().unwrap_or_else(|_| stopped());
+        let (count, mut written) = self.writer.join().unwrap_or_else(|_| stopped());
+        if count > 0 && written.is_ok() && !self.path.exists() {
+            written = Err(std::io::Error::other("another program removed it"));
+        }
         if count == 0 {
             let _ = std::fs::remove_file(&self.path);
         }
@@ -241,6 +244,23 @@ mod tests {
         }
         drop(rows);
         assert_eq!(poses.finish().0, 1);
+    }
+
+    #[test]
+    fn a_file_that_another_program_removed_is_told() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("poses.csv");
+        let never = Interrupt::never().unwrap();
+        let (poses, rows) = PosesFile::create(&path, &never, Some::<Row>).unwrap();
+        let angles = [0.5; JOINT_COUNT];
+        rows.send(Row { at_us: 7, angles }).unwrap();
+        std::fs::remove_file(&path).unwrap();
+        drop(rows);
+        let error = poses.finish().1.unwrap_err().to_string();
+        assert!(
+            error.contains("poses.csv") && error.contains("removed it"),
+            "{error}"
+        );
     }
 
     #[test]

@@ -276,6 +276,34 @@ fn a_file_that_is_there_is_never_written_over_not_even_an_empty_one() {
 }
 
 #[test]
+fn a_log_that_another_program_removes_or_cuts_short_is_told_while_it_is_written() {
+    type Harm = fn(&Path) -> std::io::Result<()>;
+    let harms: [(Harm, &str); 2] = [
+        (|path| std::fs::remove_file(path), "removed"),
+        (|path| std::fs::write(path, ""), "cut it short"),
+    ];
+    for (harm, word) in harms {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("s.mcap");
+        let (log, feed) = log(&path, records());
+        harm(&path).unwrap();
+        let end = std::time::Instant::now() + std::time::Duration::from_secs(20);
+        while log.fault().is_none() {
+            assert!(std::time::Instant::now() < end, "{word}: not told");
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        drop(feed);
+        let written = log.finish();
+        assert!(
+            written.fault.as_ref().unwrap().contains(word),
+            "{written:?}"
+        );
+        assert_eq!(written.messages, 0);
+        assert!(written.judge().is_err());
+    }
+}
+
+#[test]
 fn while_a_log_is_written_all_but_its_last_second_can_be_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.mcap");
