@@ -71,7 +71,7 @@ fn a_person_is_calibrated_in_a_minute_and_the_profile_finds_its_glove_from_then_
         "a virtual one",
         " 2 of 12   Lift the hand",
         "sensors sit elsewhere",
-        "usable, with doubts",
+        "doubtful, and usable",
         "profile    ",
     ] {
         assert!(said.contains(part), "{part} is missing in\n{said}");

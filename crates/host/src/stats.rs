@@ -167,6 +167,14 @@ pub fn time(time: Duration) -> String {
     }
 }
 
+/// How many: `1 byte`, `7 bytes`.
+pub fn bytes(count: usize) -> String {
+    match count {
+        1 => "1 byte".to_owned(),
+        _ => format!("{count} bytes"),
+    }
+}
+
 /// How often: `once`, `7 times`.
 pub fn times(count: u32) -> String {
     match count {

@@ -394,6 +394,34 @@ fn fingers_barred_by_the_scissor_give_fault_0a_and_0e_after_20_s() {
 }
 
 #[test]
+fn fingers_that_meet_while_the_mode_has_the_scissor_touch_and_closed_ones_stop_a_mode_change() {
+    let mut bench = active();
+    // Pinch, each finger on its own.
+    let fingers = |mode: u8, to: u8| {
+        let mut block = individual([to, to, to, 0], 100);
+        (block[0], block[1]) = (block[0] | mode << 1, 0x04);
+        block
+    };
+    bench.command(&fingers(1, 6));
+    bench.settle();
+    bench.command(&fingers(1, 250));
+    bench.wait_ms(25_000);
+    let status = bench.status(8);
+    assert_eq!((status[2], status[1] & 3), (0, 2), "a contact, no fault");
+    bench.command(&fingers(0, 6));
+    bench.settle();
+    bench.command(&fingers(0, 250));
+    bench.settle();
+    bench.command(&fingers(1, 250));
+    bench.wait_ms(3_000);
+    assert_eq!(bench.status(8)[2], 0x0A);
+    assert!(bench.gripper.positions()[3] < 201.0);
+    bench.command(&fingers(0, 250));
+    bench.wait_ms(3_000);
+    assert_eq!(bench.status(8)[2], 0);
+}
+
+#[test]
 fn every_fault_can_be_shown_and_major_ones_stop_until_ract_falls() {
     for code in 1..=15u8 {
         let mut bench = active();

@@ -17,6 +17,9 @@ use host::stats::short_or_dash;
 /// The least terminal for boxes: columns, rows.
 const BOXES: (u16, u16) = (60, 23);
 
+/// The least rows for a frame around what is wrong.
+const FRAMED: u16 = 5;
+
 /// Draws `view` over the whole of `frame`.
 pub fn draw(view: &View, frame: &mut Frame<'_>) {
     let area = frame.area();
@@ -135,9 +138,15 @@ fn rates(view: &View) -> Vec<Line<'static>> {
 }
 
 fn draw_faults(view: &View, frame: &mut Frame<'_>, area: Rect) {
-    let block = Block::bordered().title("now");
-    let inner = block.inner(area);
-    frame.render_widget(block, area);
+    // On a low terminal the words of a reason count for more than a frame around them.
+    let inner = if area.height < FRAMED {
+        area
+    } else {
+        let block = Block::bordered().title("now");
+        let inner = block.inner(area);
+        frame.render_widget(block, area);
+        inner
+    };
     frame.render_widget(
         Paragraph::new(fault_lines(&view.faults, inner.width, inner.height.into())),
         inner,

@@ -105,6 +105,9 @@ impl GloveView {
         match (self.calibrated, headings::summary(&self.headings)) {
             (true, Some(sure)) => format!("hand: joint angles, degrees; {sure}"),
             (true, None) => "hand: joint angles, degrees".to_owned(),
+            (false, _) if self.fingers.is_empty() => {
+                "hand: NOT CALIBRATED, no angles before it has lain flat".to_owned()
+            }
             (false, _) => {
                 "hand: NOT CALIBRATED, as if the sensors sat straight; degrees".to_owned()
             }

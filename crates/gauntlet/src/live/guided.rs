@@ -17,7 +17,7 @@ use host::calibration::guide::{Ask, PARTS, Stage, plan};
 use host::words::FINGER_NAMES;
 
 /// The least terminal for the drawing: columns, rows.
-const DRAWN: (u16, u16) = (62, 18);
+const DRAWN: (u16, u16) = (56, 18);
 /// A finger that is bent so far fills its bar, radians.
 const WHOLE: f32 = 3.8;
 
@@ -280,6 +280,11 @@ mod tests {
     fn on_a_small_terminal_the_prompt_and_the_remark_are_there_and_no_size_breaks_it() {
         let text = drawn(&view(), 40, 12);
         for part in ["2 of 12", "flat like a", "fingers up", "turn further"] {
+            assert!(text.contains(part), "{part} is missing in\n{text}");
+        }
+        // Where there is room for the drawing and the values they are there.
+        let text = drawn(&view(), 60, 20);
+        for part in ["arm", "little", "turned", "turn further"] {
             assert!(text.contains(part), "{part} is missing in\n{text}");
         }
         for (width, height) in [(1, 1), (20, 5), (300, 100)] {

@@ -70,9 +70,19 @@ pub(super) fn table(headings: &[Heading], width: u16) -> Vec<Line<'static>> {
     lines
 }
 
+/// With its sign, and nothing has one after the point.
+fn signed(value: f32) -> String {
+    let text = format!("{value:+.1}");
+    if text == "-0.0" {
+        "+0.0".to_owned()
+    } else {
+        text
+    }
+}
+
 fn cell(joint: &Heading, column: usize) -> Span<'static> {
     let text = match joint.sigma {
-        Some(sigma) => format!("±{sigma:.1}° {:+.1}°/min", joint.drift),
+        Some(sigma) => format!("±{sigma:.1}° {}°/min", signed(joint.drift)),
         None => "not known".to_owned(),
     };
     let style = match joint.held {
@@ -97,6 +107,11 @@ mod tests {
         };
         known.sigma[2] = 0.1;
         known
+    }
+
+    #[test]
+    fn a_drift_that_rounds_to_nothing_is_not_negative() {
+        assert_eq!([-0.04, 0.04, -0.06].map(signed), ["+0.0", "+0.0", "-0.1"]);
     }
 
     #[test]

@@ -10,7 +10,7 @@ mod key;
 mod keys;
 mod moving;
 mod parts;
-mod postures;
+pub mod postures;
 mod raw;
 mod small;
 pub mod teach;

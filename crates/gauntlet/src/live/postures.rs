@@ -100,7 +100,7 @@ pub fn drawing(step: Step, turning: Option<&str>) -> &'static str {
         (Step::Turn, Some(way)) if way.contains("palm down") => PALM_DOWN,
         (Step::Turn, _) => THUMB_UP,
         (Step::FirstFlat | Step::SecondFlat | Step::LastFlat, _) => FLAT,
-        (Step::Alone(host::glove::calibration::Finger::Thumb) | Step::Thumb, _) => THUMB,
+        (Step::Thumb, _) => THUMB,
         (Step::Alone(_), _) => BEND,
         (Step::Fists, _) => FIST,
         (Step::Free, _) => FREE,
@@ -132,6 +132,16 @@ mod tests {
             .map(|at| drawing(Step::Turn, Some(plan::turning(at))))
             .collect();
         assert_eq!(all.len(), 5);
+    }
+
+    #[test]
+    fn a_finger_that_is_bent_alone_is_not_drawn_as_the_thumb_across_the_palm() {
+        for part in PLAN
+            .iter()
+            .filter(|part| matches!(part.step, Step::Alone(_)))
+        {
+            assert_eq!(drawing(part.step, None), BEND);
+        }
     }
 
     #[test]

@@ -42,7 +42,7 @@ pub struct Calibrated {
     /// How often the glove was read.
     #[serde(flatten)]
     pub scanned: Scanned,
-    /// What one does with a calibrated glove.
+    /// What one does with a calibrated glove; where it failed it is the failure that says what is next.
     #[serde(flatten)]
     pub next: NextStep,
     /// Why it failed; `null` where it did not.
@@ -118,7 +118,7 @@ impl Calibrated {
             again,
             took_s,
             scanned,
-            next,
+            next: (failure.as_ref()).map_or(next, |failure| failure.next.clone()),
             failure,
         }
     }

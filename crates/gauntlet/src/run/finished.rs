@@ -32,6 +32,9 @@ impl Finished {
     /// How the gripper was left, in words, where it is safe.
     pub fn left(&self) -> Option<&'static str> {
         let stopped = self.stopped.as_ref().ok()?;
+        if self.activated && *stopped == Stopped::Untouched {
+            return Some("the gripper was activated, and not commanded after that");
+        }
         stopped.judge(&self.devices).ok()
     }
 
@@ -288,6 +291,17 @@ mod tests {
         }
         let mut prepared = finished(Ok(Stopped::Untouched), None, None);
         assert!(prepared.judge_prepared(Ok(())).is_ok());
+    }
+
+    #[test]
+    fn a_gripper_that_was_only_activated_is_not_said_to_be_untouched() {
+        let untouched = finished(Ok(Stopped::Untouched), Some(well()), None);
+        assert!(untouched.left().unwrap().contains("was not commanded"));
+        let activated = Finished {
+            activated: true,
+            ..untouched
+        };
+        assert!(activated.left().unwrap().contains("was activated"));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use host::bridge::calibration::{Refusal, Try};
 use host::bridge::clutch::Position;
 use host::bridge::event::Kind;
-use host::bridge::{HoldReason, State};
+use host::bridge::{GripperFault, HoldReason, State};
 use host::glove::hand::{LIMITS, SEGMENT_COUNT, SEGMENT_NAMES};
 use host::glove::scan::{Finding, Health};
 use host::gripper::{Activation, Contact};
@@ -251,6 +251,20 @@ impl Hands {
         }
     }
 
+    /// How a gripper that lost its activation is activated from here.
+    fn activate(&self) -> String {
+        match self {
+            Self::None(_) => "whoever drives does it".to_owned(),
+            Self::Keys(keys) => format!(
+                "end this ({}) and start it again with --activate: its fingers move",
+                Bindings::name(keys.end)
+            ),
+            Self::Options | Self::Profile(_) => {
+                "the same again with --activate: its fingers move".to_owned()
+            }
+        }
+    }
+
     fn open(&self) -> String {
         match self {
             Self::Keys(keys) => format!("open the clutch ({})", Bindings::name(keys.clutch)),
@@ -283,6 +297,10 @@ fn standing(snapshot: &Snapshot, hands: &Hands) -> Vec<String> {
         }
         State::Holding(reason) | State::SafeAction(reason) => {
             faults.push(format!("held: {reason}"));
+        }
+        // No key activates: the fingers move.
+        State::Faulted(GripperFault::ActivationLost(_)) => {
+            faults.push(format!("{}: {}", snapshot.state, hands.activate()))
         }
         State::Faulted(_) => faults.push(format!(
             "{}: mend it, {}, and close the clutch again",

@@ -9,6 +9,9 @@ use super::Run;
 use crate::wearer::Listener;
 use host::session::Order;
 
+/// A virtual person has heard and lies flat, with time to spare.
+const LIES_DOWN: Duration = Duration::from_millis(3_000);
+
 impl Run {
     /// The glove's sensors do not sit straight: by `profile` they sit, if there is one.
     pub fn wears(&mut self, profile: Option<Bound>) {
@@ -62,9 +65,12 @@ impl Run {
     /// A key asks for a flat pose. One that is not taken says no word of having begun.
     pub(super) fn ask_flat(&mut self) {
         let before = self.ended();
-        let taken = self
-            .session
-            .order(self.flat(host::glove::timing::STILL_WAIT));
+        // Who presses the key has laid the hand flat; a virtual person begins to when asked.
+        let wait = match self.person {
+            Some(_) => LIES_DOWN + host::glove::timing::STILL_WAIT,
+            None => host::glove::timing::STILL_WAIT,
+        };
+        let taken = self.session.order(self.flat(wait));
         if let Some(person) = self.person.as_ref().filter(|_| taken) {
             person.ask(Step::FirstFlat);
             self.asked_flat = Some(before);

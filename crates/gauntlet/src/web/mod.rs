@@ -71,6 +71,21 @@ impl ViewOptions {
     }
 }
 
+/// Without a browser xdg-open ends within this time.
+const OPENS: Duration = Duration::from_secs(1);
+
+/// Whether a program ends with an error within [`OPENS`].
+fn has_failed(child: &mut std::process::Child) -> bool {
+    let end = Instant::now() + OPENS;
+    loop {
+        match child.try_wait() {
+            Ok(Some(status)) => return !status.success(),
+            Ok(None) if Instant::now() < end => std::thread::sleep(Duration::from_millis(20)),
+            Ok(None) | Err(_) => return false,
+        }
+    }
+}
+
 /// A page that is served. It ends, and says so in every browser, when this is dropped.
 #[derive(Debug)]
 pub struct Page {
@@ -178,6 +193,12 @@ impl Page {
             .spawn();
         match opened {
             Ok(mut child) => {
+                if has_failed(&mut child) {
+                    tell.say(format_args!(
+                        "warning: xdg-open opened no browser: open the address above in one"
+                    ));
+                    return;
+                }
                 // Whether a browser came up is seen on the screen.
                 let _ = std::thread::Builder::new()
                     .name("browser".to_owned())

@@ -183,6 +183,8 @@ pub struct Guide {
     pub words: String,
     /// Which way to turn now.
     pub turning: Option<&'static str>,
+    /// What the hand looks like, drawn with characters; empty where nothing is drawn.
+    pub drawing: &'static str,
     /// Seconds that are left of it.
     pub left_s: f32,
     /// Share of its time that is left, 0 to 1.

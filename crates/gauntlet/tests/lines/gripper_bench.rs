@@ -98,6 +98,53 @@ fn positions_where_fingers_meet_are_refused_before_anything_moves() {
 }
 
 #[test]
+fn in_pinch_mode_one_number_never_makes_fingers_and_scissor_meet() {
+    let (gripper, _handle, path) = gripper(Config::default());
+    gripper.preset_active();
+    json(&bench(&["mode", "pinch", "--json"], &path));
+    let writes = gripper.writes();
+    let refused = refusal(&bench(&["move", "--to", "250"], &path), 1);
+    assert!(refused.contains("meet beyond 142"), "{refused}");
+    assert!(refused.contains("move --to 142 "), "{refused}");
+    assert_eq!(gripper.writes(), writes);
+    let fast = ["--speed", "255", "--json"];
+    let moved = |to: &str| json(&bench(&[&["move", "--to", to], &fast[..]].concat(), &path));
+    moved("57,176,249,60");
+    // Closed fingers stand in the scissor's way to its place: it waits until they have opened.
+    let refused = refusal(&bench(&["mode", "pinch"], &path), 1);
+    assert!(refused.contains("57, 176, 249"), "{refused}");
+    let said = moved("142");
+    assert_eq!(said["fault"]["code"], "00", "{said}");
+    let place = gripper.positions();
+    assert!(
+        place[..3].iter().all(|at| (at - 142.0).abs() < 3.0),
+        "{place:?}"
+    );
+    assert!((place[3] - 60.0).abs() < 3.0, "{place:?}");
+    moved("140");
+    assert!(gripper.positions()[3] > 240.0, "{:?}", gripper.positions());
+}
+
+#[test]
+fn a_move_that_opens_is_let_through_under_an_interference_and_no_other() {
+    let (gripper, _handle, path) = gripper(Config::default());
+    gripper.preset_active();
+    for axis in 0..3 {
+        gripper.set_position(axis, 120.0);
+    }
+    gripper.set_fault(Some(0x0A));
+    let refused = refusal(&bench(&["move", "--to", "200"], &path), 1);
+    assert!(
+        refused.contains("0A") && refused.contains("gripper move --to 0"),
+        "{refused}"
+    );
+    assert_eq!(gripper.writes(), 0);
+    let opened = bench(&["move", "--to", "50", "--speed", "255"], &path);
+    assert_eq!(opened.status.code(), Some(0), "{opened:?}");
+    assert!(gripper.positions()[0] < 53.0, "{:?}", gripper.positions());
+}
+
+#[test]
 fn a_gripper_on_the_network_is_read_and_watched() {
     let gripper = VirtualGripper::new(Config::default());
     let server = tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();

@@ -173,4 +173,10 @@ fn a_model_without_a_place_for_its_image_says_how_it_is_typed() {
     let output = run(&["export", path(model())]);
     assert!(refusal(&output, 2).contains("where the image of"));
     assert!(support::text(&output.stderr).contains("--out weights.hae"));
+    // What is not there is no model either.
+    let missing = refusal(&run(&["export", "nothing.mcap"]), 1);
+    assert!(
+        missing.contains("there is no file nothing.mcap"),
+        "{missing}"
+    );
 }

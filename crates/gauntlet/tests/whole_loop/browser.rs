@@ -344,6 +344,7 @@ fn states() -> BTreeMap<&'static str, Picture> {
         name: "turn".to_owned(),
         words: "Turn the hand all ways, flat like a board.".to_owned(),
         turning: Some("fingers up"),
+        drawing: "",
         left_s: 6.1,
         left: 0.47,
         counts: true,

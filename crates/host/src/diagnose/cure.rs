@@ -24,12 +24,15 @@ pub fn cure(fault: Fault, command: impl Fn(&str) -> Command) -> NextStep {
             .then(", then ")
             .then(activate())
             .then(": it lets go, then its fingers move)"),
+        Fault::Interference => action
+            .then(" (")
+            .then(command("gripper move --to 0"))
+            .then("; later only a reset and an activation help)"),
         Fault::None
         | Fault::ModeChangeNeeded
         | Fault::OverTemperature
         | Fault::ChipNotReady
         | Fault::NoCommunication
-        | Fault::Interference
         | Fault::Releasing => action,
     }
 }

@@ -77,10 +77,13 @@ pub fn no_glove(what: &str, path: &Path, interrupt: &Interrupt) -> Failure {
     match findings.first_wrong() {
         Some(wrong) => {
             let next = wrong.next.clone().unwrap_or_default();
-            Failure::new(
-                format!("{what}: {}", wrong.what),
-                next.then("; then ").then(doctor),
-            )
+            // `what` says at which speeds it was asked, before this look.
+            let why = wrong
+                .what
+                .split("; asked at ")
+                .next()
+                .unwrap_or(&wrong.what);
+            Failure::new(format!("{what}: {why}"), next.then("; then ").then(doctor))
         }
         None if found.is_some() => {
             Failure::new(format!("{what} in time, though it answers now"), doctor)

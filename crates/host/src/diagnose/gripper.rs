@@ -22,6 +22,7 @@ use crate::lines::Pc;
 use crate::lines::port::{BAUD, Port};
 use crate::lines::{list, tcp};
 use crate::next::{Command, NextStep, advice};
+use crate::stats;
 
 /// For an answer to a longer read, where answers are not late.
 const WAIT: Duration = Duration::from_millis(80);
@@ -236,8 +237,8 @@ fn nobody(
         ),
         Came::Noise(bytes) => (
             format!(
-                "bytes come but no Modbus frame: {} bytes{}; {tried}",
-                bytes.len(),
+                "bytes come but no Modbus frame: {}{}; {tried}",
+                stats::bytes(bytes.len()),
                 sample_of(bytes)
             ),
             "whether this is the gripper's port and not the glove's; RS-485 A against B, ground and termination".into(),

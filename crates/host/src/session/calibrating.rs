@@ -83,7 +83,10 @@ fn next(why: Refusal, devices: &Devices) -> NextStep {
             Devices::Here { glove, .. } => Command::gauntlet("calibrate")
                 .path("--glove", glove)
                 .then(" makes its profile"),
-            _ => advice("the glove's profile with --profile (")
+            Devices::Chip(address) => Command::gauntlet("calibrate")
+                .option("--bridge", address)
+                .then(" makes its profile and gives it to the bridge"),
+            Devices::Unknown => advice("the glove's profile with --profile (")
                 .then(Command::gauntlet("calibrate").word("--list"))
                 .then(" shows where it is), or --ideal for virtual sensors that sit straight"),
         },

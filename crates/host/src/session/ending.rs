@@ -146,8 +146,12 @@ impl Ending {
                     format!("the gripper never followed the hand: {reason}"),
                     self.next_step(reason, devices),
                 ),
-                None => Failure::new(
+                None if self.state == State::Idle => Failure::new(
                     "the gripper never followed the hand: the run ended, or another host opened the clutch, before it could",
+                    "the same again",
+                ),
+                None => Failure::new(
+                    "the gripper never followed the hand: the run ended before it could",
                     "the same again",
                 ),
             });

@@ -149,17 +149,23 @@ impl Hub {
         let seen = said.newest.as_ref()?;
         // Who only watches is not to blame for what another host's run came to.
         let ours = driver.closed;
+        // A glove that is not calibrated gives no angles either, and no sensor is to blame.
+        let useless = said.useless.lasted(seen.now);
+        let uncalibrated = useless.is_some() && seen.lacks_calibration();
         Some(Ending {
             state: seen.state,
             driver,
-            held: said.held.lasted(seen.now).filter(|_| ours),
+            held: (said.held.lasted(seen.now).filter(|_| ours))
+                .or(uncalibrated.then_some(HoldReason::NotCalibrated)),
             driven: match ours {
                 true => said.numbers.driven.clone(),
                 false => Driven::default(),
             },
             too_busy: said.summary(seen.now).too_busy(),
             glove_answers: seen.glove_answers,
-            useless: said.useless.lasted(seen.now).map(|()| seen.why_useless()),
+            useless: useless
+                .filter(|()| !uncalibrated)
+                .map(|()| seen.why_useless()),
             gripper_answers: seen.gripper_answers,
             disobeyed: said.numbers.obeyed.fault().filter(|_| ours),
         })
@@ -207,6 +213,30 @@ mod tests {
 
     /// Longer after a run's beginning than what was counted before it.
     const AFTER: Duration = Duration::from_secs(1);
+
+    #[test]
+    fn a_glove_that_is_not_calibrated_is_not_said_to_send_what_cannot_be_used() {
+        let hub = Hub::default();
+        for ms in (0..=2_000).step_by(10) {
+            let seen = Snapshot {
+                angles_valid: false,
+                ..Snapshot::at(ms, Position::Open, State::Idle)
+            };
+            hub.lock().say(seen, true);
+        }
+        let judged = |attended| {
+            let driver = Driver {
+                attended,
+                ..Driver::default()
+            };
+            hub.ending(driver).unwrap().judge(&Devices::Unknown)
+        };
+        let told = judged(false).unwrap_err().to_string();
+        assert!(told.contains("not calibrated"), "{told}");
+        assert!(!told.contains("cannot be used"), "{told}");
+        // Who is at the keys chose to wait.
+        assert!(judged(true).is_ok());
+    }
 
     /// A run of 12 s that ends while it follows. Of each 400 ms it was held for 250 ms, until enough frames had come in a row.
     fn held_in_pieces(totals: Totals) -> anyhow::Result<()> {

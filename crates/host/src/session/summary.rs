@@ -107,7 +107,8 @@ impl Summary {
         Self {
             glove_frames: grown.frames.into(),
             glove_frames_per_s: rate(grown.frames),
-            frames_following: grown.following_frames.into(),
+            // A frame may be answered between the counts of two moments.
+            frames_following: grown.following_frames.max(grown.answered_frames).into(),
             frames_answered: grown.answered_frames.into(),
             frames_dropped: None,
             gripper_cycles: grown.statuses.into(),

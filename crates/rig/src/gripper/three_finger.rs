@@ -271,7 +271,13 @@ impl ThreeFinger {
         let fingers = if self.mode == 3 { [0.0; 3] } else { [a, b, c] };
         let [a, b, c] = fingers;
         let scissor = MODE_SCISSOR[usize::from(self.mode & 3)];
-        if self.sweep([a, b, c, scissor], SPEED.1, seconds) {
+        let here = self.axes[3].position;
+        let barred = scissor > here && interferes([a, b, c, here + 1.0]);
+        self.count_interference(barred);
+        if barred {
+            // It waits for the fingers to open, or for another mode.
+            self.axes.iter_mut().for_each(Axis::halt);
+        } else if self.sweep([a, b, c, scissor], SPEED.1, seconds) {
             self.ready();
         }
     }
@@ -371,12 +377,13 @@ impl ThreeFinger {
             barred |=
                 deeper(self.axes[i].position + 1.0) && order.target > self.axes[i].position + 1.0;
         }
-        let individual = command.individual_fingers || command.individual_scissor;
-        self.barred_ticks = if barred && individual {
-            self.barred_ticks + 1
-        } else {
-            0
-        };
+        // The fault is the scissor's: fingers that meet while the mode has it touch each other, as an object.
+        self.count_interference(barred && command.individual_scissor);
+    }
+
+    /// Fingers and scissor have barred each other's way in this tick, or not: a fault where it lasts.
+    fn count_interference(&mut self, barred: bool) {
+        self.barred_ticks = if barred { self.barred_ticks + 1 } else { 0 };
         if self.barred_ticks >= INTERFERENCE_FATAL_TICKS {
             self.state = State::Failed;
             self.fault = fault::INTERFERENCE_LONG;

@@ -34,7 +34,7 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
         Some(_) => profile::kept(&mut link, at)?,
         None => None,
     };
-    let warnings = warnings(&status, health.as_ref(), at);
+    let warnings = warnings(&status, health.as_ref(), profile.is_some(), at);
     if at.json {
         let bridge = devices::Bridge {
             hello: hello.as_ref(),
@@ -106,7 +106,12 @@ pub(super) fn status(at: &BridgeAt) -> Result<()> {
 }
 
 /// What was left half done, or is still to do, and the commands for it.
-fn warnings(status: &Status, health: Option<&Health>, at: &BridgeAt) -> Vec<Warning> {
+fn warnings(
+    status: &Status,
+    health: Option<&Health>,
+    has_profile: bool,
+    at: &BridgeAt,
+) -> Vec<Warning> {
     let mut warnings = Vec::new();
     if status.engaged && !status.heartbeat {
         let releases = at.command("bridge release").then(", which ends the hold");
@@ -127,6 +132,8 @@ fn warnings(status: &Status, health: Option<&Health>, at: &BridgeAt) -> Vec<Warn
     if let Some(calibration) = calibration.filter(|calibration| !calibration.is_calibrated) {
         let next = match calibration.newest {
             Try::Refused(why) => refused(why, &at.devices()).next().clone(),
+            // A flat pose alone is refused without one.
+            _ if !has_profile => at.command("calibrate").then(", which makes its profile"),
             _ => at.command("bridge calibrate").into(),
         };
         warnings.push(Warning::new("the glove is not calibrated", next));

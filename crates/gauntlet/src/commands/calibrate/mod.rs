@@ -154,7 +154,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
             }
         }
     });
-    let next = next(place);
+    let next = next(place, options.out.as_deref());
     if let (Some(judged), false) = (&done.judged, options.json) {
         lines(judged)
             .iter()
@@ -188,10 +188,14 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
 }
 
 /// What one does with a calibrated glove.
-fn next(place: &Place<'_>) -> NextStep {
+fn next(place: &Place<'_>, out: Option<&Path>) -> NextStep {
     match place {
-        Place::Port(_) => place
-            .command("record")
+        // One that lies elsewhere is not found by the sensors' ids.
+        Place::Port(_) => out
+            .iter()
+            .fold(place.command("record"), |record, profile| {
+                record.path("--profile", profile)
+            })
             .option("--out", "my_hand.csv")
             .then(" records the hand, to train a map on"),
         Place::Chip(_) => place

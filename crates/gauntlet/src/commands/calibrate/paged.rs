@@ -6,6 +6,7 @@ use host::glove::hand::{JOINT_COUNT, Side};
 use super::session::Session;
 use crate::live::Key;
 use crate::live::guided::GuideView;
+use crate::live::postures::drawing;
 use crate::web::picture::{Action, Guide, Hand, Headline, Tone};
 use crate::web::{self, Picture, Wish};
 
@@ -69,6 +70,10 @@ fn picture(view: &GuideView, over: bool) -> Picture {
                 _ => plan::words(ask.step).to_owned(),
             },
             turning: ask.turning,
+            drawing: match ask.stage {
+                Stage::Waiting | Stage::Over => "",
+                _ => drawing(ask.step, ask.turning),
+            },
             left_s: left,
             left: left / of.max(1e-3),
             counts: ask.counts,

@@ -247,7 +247,10 @@ impl Session {
     }
 
     pub(super) fn view(&self) -> GuideView {
-        let (end, good, keys) = self.end();
+        let (end, good, mut keys) = self.end();
+        if let Some(page) = &self.page {
+            keys = format!("{keys}   page: {}", page.address());
+        }
         GuideView {
             elapsed: self.started.elapsed(),
             ask: self.guide.ask(self.source.now()),

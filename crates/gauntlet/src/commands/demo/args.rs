@@ -57,7 +57,8 @@ pub struct Demo {
     /// Take this profile of the virtual person's glove (`simulate` with the same seed writes one) instead of calibrating.
     #[arg(long, value_name = "FILE.toml", conflicts_with_all = ["ideal", "calibrate"])]
     pub profile: Option<PathBuf>,
-    /// Run the bridge's ARM firmware in QEMU instead of on this processor.
+    /// Run the bridge's ARM firmware in QEMU instead of on this processor; without --log, since the bytes at a chip's ports are not
+    /// seen here.
     #[arg(long, conflicts_with = "log")]
     pub on_chip: bool,
     /// The firmware for --on-chip, instead of the one that `cargo xtask firmware` built.

@@ -15,6 +15,13 @@ use host::training::model;
 pub(super) fn run(options: &Export) -> Result<()> {
     let tell = Tell::new(options.json);
     let Some(out) = options.out.as_deref() else {
+        if !options.file.exists() {
+            return Err(Failure::new(
+                format!("there is no file {}", options.file.display()),
+                "the path of a trained model or of a session log",
+            )
+            .into());
+        }
         return Err(Failure::usage(
             format!(
                 "where the image of {} goes is not said",

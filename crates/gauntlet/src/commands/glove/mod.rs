@@ -20,7 +20,7 @@ pub use watch::Watch;
 #[command(after_help = "\
 Examples:
   gauntlet glove watch --glove /dev/ttyUSB0                      the sensors, the rates
-  gauntlet glove watch --glove /tmp/glove --ideal --seconds 10   a virtual glove's hand, too
+  gauntlet glove watch --glove /tmp/glove --seconds 10           a virtual glove's hand, too
 
 watch only reads. Without a calibration the angles are those of sensors that would sit straight, and that is said. \
 q or Ctrl-C ends it and prints how every sensor did. Exit code 1 where the glove gave nothing at the end.")]

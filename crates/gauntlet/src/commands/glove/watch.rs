@@ -5,6 +5,8 @@ use std::time::{Duration, Instant};
 
 use anyhow::Result;
 use clap::Args;
+use host::calibration::virtual_person::VirtualPerson;
+use host::glove::calibration::Step;
 use host::glove::hand::{JOINT_COUNT, LIMITS, SEGMENT_NAMES};
 use host::glove::imu;
 use host::glove::scan::{Health, State};
@@ -63,6 +65,8 @@ pub(super) fn run(options: &Watch, interrupt: &Interrupt) -> Result<()> {
         scanning: opened.scanning,
         clock,
         pose: None,
+        person: VirtualPerson::at(&at.glove),
+        asked: false,
         findings: VecDeque::new(),
         seen: 0,
         found: Vec::new(),
@@ -71,6 +75,7 @@ pub(super) fn run(options: &Watch, interrupt: &Interrupt) -> Result<()> {
     let started = Instant::now();
     watching.scanning.begin();
     let watched = watching.watch(options, started, interrupt);
+    watching.let_go();
     let snapshot = watching.scanning.snapshot();
     let silent = watching.newest.elapsed() >= SILENT;
     let stopped = watching.scanning.stop();
@@ -106,6 +111,10 @@ struct Watching {
     scanning: Scanning,
     clock: Clock,
     pose: Option<Pose>,
+    /// The virtual person in the glove, who lies flat when asked.
+    person: Option<VirtualPerson>,
+    /// It was asked, and not let go since.
+    asked: bool,
     /// What was found lately, and when.
     findings: VecDeque<(Instant, String)>,
     seen: u64,
@@ -129,6 +138,9 @@ impl Watching {
                 self.newest = Instant::now();
             }
             self.hand.pass(self.clock.now());
+            if !matches!(self.hand.flat(), Flat::Waiting(_)) {
+                self.let_go();
+            }
             self.look_for_findings(options.at.json);
             for key in live.keys().or_fail(terminal, next)? {
                 match key {
@@ -155,6 +167,18 @@ impl Watching {
 
     fn lay_flat(&mut self) {
         self.hand.begin_flat(self.clock.now(), ticks(FLAT_WAIT));
+        if let Some(person) = &self.person {
+            person.ask(Step::FirstFlat);
+            self.asked = true;
+        }
+    }
+
+    fn let_go(&mut self) {
+        if std::mem::take(&mut self.asked)
+            && let Some(person) = &self.person
+        {
+            person.let_go();
+        }
     }
 
     fn look_for_findings(&mut self, quiet: bool) {
@@ -191,7 +215,11 @@ impl Watching {
             total: options.seconds,
             state: self.state(seen, calibrated),
             good: all_good && calibrated,
-            fingers: self.pose.as_ref().map(fingers).unwrap_or_default(),
+            // Zeros are no angles: with a profile there are none before the hand has lain flat.
+            fingers: (self.pose.as_ref())
+                .filter(|pose| calibrated || pose.angles.iter().any(|angle| *angle != 0.0))
+                .map(fingers)
+                .unwrap_or_default(),
             hand_age: (age >= OLD).then_some(age.as_secs_f32()),
             calibrated,
             headings: headings::of(self.hand.headings()),

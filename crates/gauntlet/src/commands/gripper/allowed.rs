@@ -6,12 +6,17 @@ use host::gripper::{Activation, Fault, Status};
 use super::args::Target;
 use host::failure::Failure;
 
-/// Whether the gripper may be told to move.
+/// Whether the gripper may be told to move. A move that only `opens` is what an interference asks for.
 ///
 /// # Errors
-/// Any fault it reports, as in `teleop`; or that it is not ready.
-pub(super) fn may_move<const X: usize>(status: &Status<X>, target: &Target) -> Result<(), Failure> {
-    if status.fault != Fault::None {
+/// Any other fault it reports, as in `teleop`; or that it is not ready.
+pub(super) fn may_move<const X: usize>(
+    status: &Status<X>,
+    target: &Target,
+    opens: bool,
+) -> Result<(), Failure> {
+    let cures = opens && status.fault == Fault::Interference;
+    if status.fault != Fault::None && !cures {
         let next = match (status.fault, status.activation) {
             // It is activated: only a new start clears that.
             (Fault::ActivationNeeded | Fault::NotActivated, Activation::Ready) => target

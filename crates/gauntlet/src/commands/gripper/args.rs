@@ -208,8 +208,17 @@ impl Move {
         self.target.patient(&self.verb())
     }
 
+    /// The same to another position.
+    pub fn again_to(&self, to: &[u8]) -> Command {
+        self.target.again(&self.verb_to(to))
+    }
+
     fn verb(&self) -> String {
-        let to: Vec<String> = self.to.iter().map(u8::to_string).collect();
+        self.verb_to(&self.to)
+    }
+
+    fn verb_to(&self, to: &[u8]) -> String {
+        let to: Vec<String> = to.iter().map(u8::to_string).collect();
         format!(
             "move --to {} --speed {} --force {}",
             to.join(","),

@@ -36,6 +36,11 @@ impl Axes {
         }
     }
 
+    /// Whether a move to `target` opens every axis that it moves, or leaves it: what frees fingers that are in each other's way.
+    pub(super) fn only_open<const X: usize>(self, target: &[u8; X], here: &[u8; X]) -> bool {
+        (0..X).all(|axis| !self.moves(axis) || target[axis] <= here[axis])
+    }
+
     /// The axes whose echoes repeat the command block: in scissor mode the scissor's number goes where finger A's is.
     pub(super) fn echoes(self, axis: usize) -> bool {
         match self {
@@ -92,7 +97,7 @@ pub(super) fn next_command<const X: usize>(
             });
             limits::keep_inside(wanted, &ceiling, &status.position, &target.map(f32::from))
         }
-        // The mode keeps fingers and scissor apart.
+        // The mode keeps fingers and scissor apart; in pinch mode what could meet is led axis by axis.
         Axes::Fingers | Axes::Scissor => wanted,
     }
 }

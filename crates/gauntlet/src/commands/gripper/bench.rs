@@ -39,6 +39,10 @@ pub trait Bench<const X: usize>: Gripper<X, Error = host::gripper::Error> {
     fn set_control(&mut self, control: Control);
     /// Whether one position is the scissor's.
     fn is_in_scissor_mode(&self) -> bool;
+    /// Whether it is in the mode in which finger A closes between the others.
+    fn is_in_pinch_mode(&self) -> bool {
+        false
+    }
     /// The gripper's name and those of its axes.
     fn names(&self) -> (&'static str, [&'static str; X]);
     /// What only this family tells: name and value.
@@ -83,6 +87,9 @@ impl Bench<4> for ThreeFinger<Line> {
     }
     fn is_in_scissor_mode(&self) -> bool {
         self.mode() == Some(three_finger::Mode::Scissor)
+    }
+    fn is_in_pinch_mode(&self) -> bool {
+        self.mode() == Some(three_finger::Mode::Pinch)
     }
     fn names(&self) -> (&'static str, [&'static str; 4]) {
         ("3-Finger gripper", host::words::AXIS_WORDS)

@@ -179,7 +179,8 @@ impl<'a, const X: usize> Leader<'a, X> {
     ) -> Option<End<X>> {
         let gives_back = self.axes.gives_the_scissor_back(status)
             && matches!(status.fault, Fault::None | Fault::ModeChangeNeeded);
-        if !gives_back && let Err(failure) = may_move(status, &self.options.target) {
+        let opens = self.axes.only_open(&self.target, &status.position);
+        if !gives_back && let Err(failure) = may_move(status, &self.options.target, opens) {
             let hold = can_hold(status);
             return Some(End::Refused { failure, hold });
         }

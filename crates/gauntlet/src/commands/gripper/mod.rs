@@ -8,6 +8,7 @@ mod doing;
 mod hold;
 mod leader;
 mod motion;
+mod pinch;
 mod progress;
 mod proof;
 mod refusal;
@@ -101,6 +102,9 @@ fn act<B: Bench<X>, const X: usize>(
             doing.show_status(&status)
         }
         Verb::Mode(options) => {
+            if options.mode == Grasp::Pinch {
+                pinch::may_close_scissor(&doing, &status)?;
+            }
             doing.mode(options.mode)?;
             doing.show(Some(("in its new mode", |status| {
                 status.activation == Activation::Ready

@@ -17,6 +17,7 @@ use super::axes::Axes;
 use super::bench::Bench;
 use super::doing::Doing;
 use super::leader::{End, LEAD, Leader, SILENCE};
+use super::pinch;
 use crate::note;
 use host::failure::{Failure, OrFail};
 use host::interrupt::Suspend;
@@ -36,12 +37,17 @@ pub(super) fn run<B: Bench<X>, const X: usize>(
 ) -> Result<Status<X>> {
     let target = positions::<X>(&options.to, doing.driver.names().0)?;
     let status = &heard_again(doing, status);
-    may_move(status, doing.target)?;
     let axes = match (options.to.len() == X, doing.driver.is_in_scissor_mode()) {
         (true, _) => Axes::Each,
         (false, false) => Axes::Fingers,
         (false, true) => Axes::Scissor,
     };
+    let (axes, target) = pinch::ordered(doing, options, (axes, target), status)?;
+    may_move(
+        status,
+        doing.target,
+        axes.only_open(&target, &status.position),
+    )?;
     doing.driver.set_control(axes.control());
     doing.tell.say(format_args!(
         "moving to {}, speed {}, force {}",

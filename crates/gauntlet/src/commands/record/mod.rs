@@ -30,7 +30,7 @@ use session::Session;
 #[command(after_help = "\
 Examples:
   gauntlet record --glove /dev/ttyUSB0 --out my_hand.csv
-  gauntlet record --glove /tmp/glove --ideal --out my_hand.csv --seconds 70
+  gauntlet record --glove /tmp/glove --out my_hand.csv --seconds 70
   gauntlet train --poses my_hand.csv --out model.safetensors   (then)
 
 No gripper and no model is needed. The hand lies flat first, then each movement is asked for in words: 80 seconds. \

@@ -64,6 +64,8 @@ pub struct Report {
 /// A failure that names the file and what is wrong with it.
 pub(crate) fn run(options: &Report) -> Result<()> {
     let tell = Tell::new(options.json);
+    // First: without it there is nothing to look for beside it.
+    let model = model::load(&options.model, &Person)?;
     let poses = poses(options)?;
     let out = options
         .out
@@ -72,7 +74,6 @@ pub(crate) fn run(options: &Report) -> Result<()> {
     let mut inputs = vec![options.model.as_path(), &poses];
     inputs.extend(options.pairs_file.as_deref());
     outputs::check(&out, Kind::Page, &inputs)?;
-    let model = model::load(&options.model, &Person)?;
     let [_, _, axes] = model.shape();
     let space = Space::of_axes(axes).unwrap_or(Space::ThreeFinger);
     let motion = Motion::open_for_measuring(&poses, &Person)?;

@@ -143,6 +143,13 @@ fn spawn(device: Box<dyn Device>, link: &Path) -> Result<Handle> {
     let spawned = realtime::starting(|| PtyDevice::spawn(device, Some(link)));
     spawned.and_then(|(handle, _)| handle).map_err(|error| {
         let (what, next) = match error.kind() {
+            ErrorKind::AlreadyExists if link.is_symlink() && link.exists() => (
+                format!(
+                    "{} leads to a terminal: a simulate runs there",
+                    link.display()
+                ),
+                "ending that one (Ctrl-C), or other paths for --glove and --gripper",
+            ),
             ErrorKind::AlreadyExists => (
                 format!(
                     "{} exists and is not a dead link to a terminal",

@@ -26,6 +26,7 @@ use host::clock::rfc3339;
 use host::interrupt::Interrupt;
 use host::lines::Model;
 use host::probe;
+use host::settings::place::OVERRIDE;
 use host::training::motion::Motion;
 
 /// How often the wait for Ctrl-C looks for a line on standard input, and for what the virtual person is asked.
@@ -114,7 +115,8 @@ fn keep_profile(
         ),
         Err(failure) => {
             say!("warning: the glove's profile is not kept: {failure}");
-            say!("  try: {}", failure.next_step());
+            // Where a profile goes is no option of this verb.
+            say!("  try: a settings folder that you may write in, named by {OVERRIDE}");
         }
     }
     Ok(())

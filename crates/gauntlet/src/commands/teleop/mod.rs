@@ -115,7 +115,7 @@ pub(crate) fn run(options: &Teleop, interrupt: &Interrupt) -> Result<()> {
         false => Err(no_frames(&options.glove, interrupt)),
     };
     if !options.json {
-        finished.tell(&tell, "");
+        finished.tell(&tell, "summary    ");
     }
     let (judgement, failure) = results::judged(finished.judge(driven));
     if options.json && finished.ending.is_some() {

@@ -49,6 +49,11 @@ pub(in crate::commands) fn taken(starts: &[Start]) -> String {
     let dearest = whole.clone().map(cost).fold(f64::NAN, f64::max);
     match starts.len() {
         0 | 1 => String::new(),
+        count if whole.clone().count() == 1 => format!(
+            "; start {} of {count} is taken, the only one that came to the end: cost {:.4}",
+            number + 1,
+            cost(taken)
+        ),
         count => format!(
             "; start {} of {count} is taken, of {} that came to the end: cost {:.4}, the others up to {dearest:.4}",
             number + 1,

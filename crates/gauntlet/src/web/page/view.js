@@ -10,6 +10,7 @@ const TOUCH = matchMedia("(pointer: coarse)").matches;
 const BEAT = 100; // ms between two heartbeats: the bridge holds after 250
 const ANSWER = 700; // ms for the program to say that this page holds the clutch
 const MINUTE = 60;
+const NAMES = ["thumb", "index", "middle", "ring", "little"];
 const THEMES = {
   dark: { skin: [214, 209, 202], metal: [128, 137, 150], haze: [23, 28, 37], seam: "rgb(8 10 14 / 0.5)", floor: "rgb(120 145 180 / 0.16)", ring: "rgb(160 180 205 / 0.13)", shadow: "rgb(0 0 0 / 0.75)", ghost: "#F0E442" },
   light: { skin: [226, 215, 203], metal: [142, 150, 162], haze: [236, 239, 243], seam: "rgb(40 48 60 / 0.4)", floor: "rgb(90 110 140 / 0.14)", ring: "rgb(60 80 110 / 0.16)", shadow: "rgb(30 40 60 / 0.45)", ghost: "#0072B2" },
@@ -133,7 +134,7 @@ function clutchWords() {
     default:
       if (mine) return "clutch closed: let go to open";
       if (clutch.page !== null) return `clutch held on another page: ${ESCAPE} opens it`;
-      return clutch.terminal ? `clutch closed by the program: ${ESCAPE} opens it` : `clutch closed elsewhere: ${ESCAPE} opens it`;
+      return clutch.terminal ? `clutch closed where the program runs: ${ESCAPE} opens it` : `clutch closed elsewhere: ${ESCAPE} opens it`;
   }
 }
 
@@ -277,8 +278,7 @@ function sensors(hand) {
   put("sensors-words", `${good} of ${hand.sensors.length} good${sure}`);
   if (!document.querySelector("#sensors-panel details[open]")) return;
   rows("sensors", hand.sensors.map((each) => [each.name, each.words, each.sigma_deg === null ? "" : `±${each.sigma_deg.toFixed(1)}°`]));
-  const fingers = ["thumb", "index", "middle", "ring", "little"];
-  rows("angles", fingers.map((name, k) => [name, ...hand.angles_deg.slice(5 * k, 5 * k + 5).map((angle) => angle?.toFixed(1) ?? "–")]));
+  rows("angles", NAMES.map((name, k) => [name, ...hand.angles_deg.slice(5 * k, 5 * k + 5).map((angle) => angle?.toFixed(1) ?? "–")]));
 }
 
 function rows(id, values) {
@@ -473,6 +473,9 @@ function guide() {
   put("guide-words", guide.turning ? `${guide.words} Now: ${guide.turning}.` : guide.words);
   $("guide-left").style.width = `${100 * guide.left}%`;
   $("guide-left").classList.toggle("counts", guide.counts);
+  put("guide-drawing", guide.drawing);
+  const bends = guide.end.length ? [] : guide.bends_deg.map((bend, finger) => `${NAMES[finger]} ${Math.round(bend)}°`);
+  put("guide-bends", bends.length ? `bent by, at the tip: ${bends.join(", ")}` : "");
   list("guide-remarks", guide.end.length ? guide.end : guide.remarks);
 }
 

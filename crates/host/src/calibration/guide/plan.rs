@@ -87,7 +87,7 @@ pub fn words(step: Step) -> &'static str {
         Step::Alone(Finger::Middle) => "Now the middle finger, twice.",
         Step::Alone(Finger::Ring) => "Now the ring finger, twice.",
         Step::Alone(Finger::Little) => "Now the little finger, twice.",
-        Step::Alone(Finger::Thumb) => "Now the thumb, twice.",
+        Step::Alone(Finger::Thumb) => "Now the thumb: bend and stretch it twice.",
         Step::Fists => "Four fists, and open each; turn the hand a little between them.",
         Step::Thumb => "Thumb out and across the palm, twice.",
         Step::Free => "Move all fingers as you like.",

@@ -10,6 +10,7 @@ use crate::diagnose::raw::{self, Expect, Heard, hex, listen, text};
 use crate::interrupt::Interrupt;
 use crate::lines::port::Port;
 use crate::next::{Command, advice};
+use crate::stats;
 
 /// For the first answer, however late.
 const FIRST_WAIT: Duration = Duration::from_millis(500);
@@ -235,8 +236,9 @@ pub fn nobody(seen: &[(u32, Survey)], findings: &mut Findings) {
     findings.wrong(
         "bridge",
         format!(
-            "{} bytes come at {baud} baud, but no I2CStat (one byte F0 to F8): {}; asked at {speeds} baud",
-            bytes.len(),
+            "{} come{} at {baud} baud, but no I2CStat (one byte F0 to F8): {}; asked at {speeds} baud",
+            stats::bytes(bytes.len()),
+            if bytes.len() == 1 { "s" } else { "" },
             shown(bytes)
         ),
         "unplug the glove and plug it in again (it then speaks 9600 baud); whether this is the glove's port",

@@ -59,9 +59,20 @@ fn link_note(target: Option<&Path>) -> String {
     })
 }
 
+/// Whether it is an address of a network, with a port or without.
+fn is_address(path: &Path) -> bool {
+    path.to_str().is_some_and(|text| {
+        text.parse::<std::net::IpAddr>().is_ok() || text.parse::<std::net::SocketAddr>().is_ok()
+    })
+}
+
 impl From<OpenError> for Failure {
     fn from(error: OpenError) -> Self {
         let next = match &error {
+            OpenError::Missing { path, target: None } if is_address(path) => advice(format!(
+                "a gripper on the network is named tcp:{}",
+                path.display()
+            )),
             OpenError::Missing { target: None, .. } => advice("plug the adapter in, and ")
                 .then(Command::gauntlet("ports"))
                 .then(" to see the ports there are"),
@@ -166,4 +177,20 @@ pub(crate) fn group_of(path: &Path) -> String {
     found
         .filter(|name| name != "root")
         .unwrap_or_else(|| "dialout".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_address_that_was_taken_for_a_port_is_told_as_it_is_typed() {
+        let next = |path: &str| {
+            let path = path.into();
+            Failure::from(OpenError::Missing { path, target: None }).next_step()
+        };
+        assert!(next("192.168.1.11").contains("tcp:192.168.1.11"));
+        assert!(next("192.168.1.11:502").contains("tcp:192.168.1.11:502"));
+        assert!(next("/dev/ttyUSB7").contains("plug the adapter in"));
+    }
 }
