@@ -301,23 +301,22 @@ impl LogFile {
     }
 
     fn close_chunk(&mut self) -> McapResult<()> {
-        self.writer.flush()?;
-        let bytes = self.file.stream_position()?;
-        if let Some(what) = self.taken(bytes)? {
+        if let Some(what) = self.taken()? {
             self.whole = Whole::default();
             return Err(io::Error::other(what).into());
         }
+        self.writer.flush()?;
         self.whole = self.written;
-        self.whole.bytes = bytes;
+        self.whole.bytes = self.file.stream_position()?;
         Ok(())
     }
 
-    /// What another program did to the file, which should have `bytes`.
-    fn taken(&self, bytes: u64) -> io::Result<Option<&'static str>> {
+    /// What another program did to what is written.
+    fn taken(&self) -> io::Result<Option<&'static str>> {
         let found = self.file.metadata()?;
         Ok(if found.nlink() == 0 {
             Some("another program removed it")
-        } else if found.len() < bytes {
+        } else if found.len() < self.whole.bytes {
             Some("another program cut it short")
         } else {
             None
