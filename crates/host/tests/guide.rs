@@ -396,6 +396,9 @@ fn a_left_glove_that_is_said_to_be_right_is_named_and_refused_and_the_other_way_
         assert!(told[0].starts_with(&format!("the glove is on a {is} hand, and {said} was said")));
         assert!(told[0].contains(&format!("--hand {is}")));
         assert_eq!(bench.judged().verdict(), Verdict::Bad);
+        let shown = bench.judged().of_the_hand_shown().unwrap();
+        assert_eq!(shown.verdict(), Verdict::Good);
+        assert_eq!(shown.of_the_hand_shown(), None, "that is the hand it shows");
     }
 }
 

@@ -34,6 +34,8 @@ pub struct GuideView {
     pub end: Vec<String>,
     /// Whether that is good.
     pub good: bool,
+    /// What keeps it is called, once it can be kept.
+    pub keep: Option<String>,
     /// What keys do.
     pub keys: String,
 }
@@ -246,6 +248,7 @@ mod tests {
             glove: "16 of 16 sensors, 35.0 scans/s".to_owned(),
             end: Vec::new(),
             good: false,
+            keep: None,
             keys: "space: begin   r: this step again   q: end".to_owned(),
         }
     }

@@ -40,6 +40,9 @@ const LINE_EVERY: Duration = Duration::from_secs(1);
 /// A view that was not taken for so long is one that nobody sees.
 const UNSEEN: Duration = Duration::from_millis(250);
 
+/// What was said before a view is waited for so long, to stand on the terminal first.
+const SAID: Duration = Duration::from_millis(250);
+
 /// Keys that came while nobody looked for longer than this are old.
 const LOOKED: Duration = Duration::from_millis(300);
 
@@ -94,6 +97,8 @@ struct Drawn {
 
 impl Drawn {
     fn start() -> std::io::Result<Self> {
+        // Lines that wait would begin where the one before ended: in raw mode a line feed is no carriage return.
+        out::settle(SAID);
         let raw = Raw::enter()?;
         let area = raw::size();
         Ok(Self {

@@ -367,4 +367,45 @@ mod tests {
         (0..10).for_each(|_| joint.pass(1.0 / 35.0));
         assert!((shown(&joint) - gained).abs() < 1e-6);
     }
+
+    /// Looks at a joint for so many minutes, each of which shows `seen` radians, every fifth scan.
+    fn looked_at(kind: Kind, minutes: u64, seen: f32) -> Joint {
+        let mut joint = Joint::new(kind);
+        joint.start(0.0, Instant::from_ticks(0));
+        let (sin, cos) = libm::sincosf(seen);
+        for step in 1..=420 * minutes {
+            let at = Instant::from_ticks(5 * SCAN * step);
+            joint.update(Some(Look::new([1.0, 0.0, 0.0], [cos, sin, 0.0])), 0.0, at);
+        }
+        joint
+    }
+
+    #[test]
+    fn a_posture_that_lasts_is_learnt_as_one_and_does_not_become_the_heading() {
+        let joint = looked_at(Kind::Mcp, 10, rad(8.0));
+        let (heading, offset) = (joint.heading.to_degrees(), joint.offset.to_degrees());
+        assert!(offset > 3.0 && heading < 3.0, "{heading}° and {offset}°");
+    }
+
+    #[test]
+    fn looks_within_a_second_say_the_same_thing_and_make_nothing_surer() {
+        let joint = looked_at(Kind::Hinge, 1, 0.0);
+        let [heading, _, both, _, _, offset] = joint.p;
+        // As well as 30 looks of 2°, 2 s apart, show it, and not as well as 420 would.
+        let sigma = libm::sqrtf(heading + 2.0 * both + offset).to_degrees();
+        assert!((0.3..0.8).contains(&sigma), "{sigma}°");
+    }
+
+    #[test]
+    fn a_heading_that_nobody_looks_at_walks_by_0_42_degrees_in_a_minute() {
+        let mut joint = Joint::new(Kind::Hinge);
+        joint.start(0.0, Instant::from_ticks(0));
+        joint.p = [0.0; 6];
+        joint.predict(Instant::from_ticks(60_000_000));
+        assert!(
+            (joint.sigma() - rad(0.42)).abs() < rad(0.01),
+            "{}",
+            joint.sigma()
+        );
+    }
 }

@@ -173,3 +173,36 @@ impl Regain {
 fn parent(k: usize) -> usize {
     hand::parent(k).unwrap_or(0) % SEGMENT_COUNT
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::kind;
+    use super::*;
+
+    /// Whether the hinges beside sensor 5, which restarted, have a heading again after two seconds of an axis `level` of whose length
+    /// is level.
+    fn regained(level: f32) -> bool {
+        let start = Instant::from_ticks(0);
+        let mut joints: [Joint; SEGMENT_COUNT] = core::array::from_fn(|k| {
+            let mut joint = Joint::new(kind(k));
+            joint.start(0.0, start);
+            joint
+        });
+        let mut regain = Regain::new();
+        regain.lose(5, &mut joints, start);
+        assert!(!joints[5].known && !joints[6].known && joints[4].known);
+        let axis = [level, 0.0, libm::sqrtf(1.0 - level * level)];
+        for scan in 1..=70 {
+            let at = Instant::from_ticks(scan * 28_571);
+            regain.take(&mut joints, |_| Some(Look::new(axis, axis)), at);
+        }
+        joints[5].known && joints[6].known
+    }
+
+    #[test]
+    fn an_axis_that_is_nearly_vertical_gives_no_heading_back() {
+        assert!(regained(0.9) && regained(0.4));
+        assert!(!regained(0.3), "9 % of it are seen");
+        assert!(!regained(0.05));
+    }
+}

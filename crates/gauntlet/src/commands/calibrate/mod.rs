@@ -139,6 +139,7 @@ fn guided(options: &Calibrate, place: &Place<'_>, interrupt: &Interrupt) -> Resu
         }
         Led::Judged { judged, agreed } => {
             decide(options, &judged, agreed)?;
+            done.judged = Some((*judged).clone());
             let when = clock::rfc3339(SystemTime::now());
             let profile = judged.kept(ids, when);
             let path = match &options.out {

@@ -46,9 +46,14 @@ fn picture(view: &GuideView, over: bool) -> Picture {
     };
     let seconds = |time: host::glove::Duration| time.as_ticks() as f32 / 1e6;
     let (left, of) = (seconds(ask.left), seconds(ask.of));
-    let go = match over {
-        true => "keep it (space)",
-        false => "begin, or go on (space)",
+    let go = match (over, &view.keep) {
+        (false, _) => Some("begin, or go on (space)".to_owned()),
+        (true, keep) => keep.as_ref().map(|keep| format!("{keep} (space)")),
+    };
+    let again = Action {
+        name: AGAIN,
+        key: "r",
+        words: "again (r)".to_owned(),
     };
     Picture {
         title: "gauntlet calibrate".to_owned(),
@@ -81,18 +86,15 @@ fn picture(view: &GuideView, over: bool) -> Picture {
             bends_deg: ask.bends.iter().map(|bend| bend.to_degrees()).collect(),
             end: view.end.clone(),
         }),
-        actions: vec![
-            Action {
+        actions: go
+            .map(|words| Action {
                 name: GO,
                 key: " ",
-                words: go.to_owned(),
-            },
-            Action {
-                name: AGAIN,
-                key: "r",
-                words: "again (r)".to_owned(),
-            },
-        ],
+                words,
+            })
+            .into_iter()
+            .chain([again])
+            .collect(),
         ..Picture::default()
     }
 }

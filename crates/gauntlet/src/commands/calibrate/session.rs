@@ -164,11 +164,18 @@ impl Session {
         }
     }
 
-    /// The person wants to keep what it came to; `None` where it cannot be kept.
+    /// The person wants to keep what it came to, of the hand that it shows; `None` where it cannot be kept.
     fn agreed(&self) -> Option<Led> {
-        match self.guide.ended() {
-            Some(Ok(judged)) if judged.verdict() == Verdict::Bad && !self.keep_anyway => None,
-            _ => Some(self.over(true)),
+        let Some(Ok(judged)) = self.guide.ended() else {
+            return Some(self.over(true));
+        };
+        match judged.of_the_hand_shown() {
+            Some(judged) => Some(Led::Judged {
+                judged: Box::new(judged),
+                agreed: true,
+            }),
+            None if judged.verdict() == Verdict::Bad && !self.keep_anyway => None,
+            None => Some(self.over(true)),
         }
     }
 
@@ -257,8 +264,28 @@ impl Session {
             glove: self.source.line(),
             end,
             good,
+            keep: self.keeping(),
             keys,
         }
+    }
+
+    /// What keeps it is called, once it can be kept.
+    fn keeping(&self) -> Option<String> {
+        let judged = self.guide.ended()?.as_ref().ok()?;
+        let shown = judged.of_the_hand_shown();
+        if judged.verdict() == Verdict::Bad && !self.keep_anyway && shown.is_none() {
+            return None;
+        }
+        let hand = match (shown, judged.outcome.profile.side) {
+            (None, _) => "",
+            (Some(_), Side::Left) => " as a left hand's",
+            (Some(_), Side::Right) => " as a right hand's",
+        };
+        let seats = match judged.is_swapped() {
+            true => ", the sensors as they sit",
+            false => "",
+        };
+        Some(format!("keep it{hand}{seats}"))
     }
 
     /// What it came to, whether that is good, and what keys do.
@@ -274,20 +301,15 @@ impl Session {
                 return (lines, false, "r: all of it again   q: end".to_owned());
             }
         };
-        let bad = judged.verdict() == Verdict::Bad;
-        let mut keys = Vec::new();
-        if !bad || self.keep_anyway {
-            keys.push(match judged.is_swapped() {
-                true => "space: keep it, the sensors as they sit".to_owned(),
-                false => "space: keep it".to_owned(),
-            });
-        }
+        let mut keys: Vec<String> = Vec::new();
+        keys.extend(self.keeping().map(|keeps| format!("space: {keeps}")));
         let again = judged
             .again()
             .map_or("the last flat pose", |again| again.words());
         keys.push(format!("r: {again} again"));
         keys.push("q: end without keeping it".to_owned());
-        (super::verdict::lines(judged), !bad, keys.join("   "))
+        let good = judged.verdict() != Verdict::Bad;
+        (super::verdict::lines(judged), good, keys.join("   "))
     }
 
     /// Ends the reading.

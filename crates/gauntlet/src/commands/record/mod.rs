@@ -25,6 +25,9 @@ use host::recording::poses::PosesFile;
 use host::training::recorded::{self, Verdict};
 use session::Session;
 
+/// A recording without prompts in which every movement can have been shown.
+const ENOUGH: Duration = Duration::from_secs(60);
+
 /// Options of `record`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
@@ -114,7 +117,7 @@ fn finish(
     let good = verdict.as_ref().is_ok_and(|verdict| verdict.good) && ended.is_ok();
     let next = match &verdict {
         Ok(verdict) if verdict.good => train(options),
-        _ => once_more(options),
+        _ => better(options),
     };
     let place = options.out.display();
     if rows > 0 {
@@ -183,7 +186,14 @@ fn train(options: &Record) -> NextStep {
 }
 
 /// The same again into another file: this one is never written over.
-fn once_more(options: &Record) -> NextStep {
+/// What makes a good recording: in less than a minute nobody shows every movement, and the prompts lead through them.
+fn better(options: &Record) -> NextStep {
+    let seconds = options.seconds.filter(|time| *time >= ENOUGH);
+    once_more(options, seconds)
+}
+
+/// The same into another file, for `seconds` or with prompts.
+fn once_more(options: &Record, seconds: Option<Duration>) -> NextStep {
     let name = options
         .out
         .file_stem()
@@ -204,7 +214,7 @@ fn once_more(options: &Record) -> NextStep {
         WhichHand::Right if options.at.ideal => command = command.option("--hand", "right"),
         WhichHand::Right => {}
     }
-    if let Some(time) = options.seconds {
+    if let Some(time) = seconds {
         command = command.option("--seconds", time.as_secs_f64());
     }
     if let Some(profile) = &options.at.profile {
@@ -219,7 +229,7 @@ fn not_good(options: &Record, verdict: &Verdict) -> Failure {
         options.out.display(),
         verdict.faults.join("; ")
     );
-    Failure::new(what, once_more(options))
+    Failure::new(what, better(options))
 }
 
 fn nothing(options: &Record) -> Failure {
@@ -265,7 +275,7 @@ fn lost_calibration(options: &Record) -> Failure {
     let what = format!(
         "the glove on {place} is no longer calibrated: the sensor of the hand, or two others, started anew"
     );
-    Failure::new(what, once_more(options))
+    Failure::new(what, once_more(options, options.seconds))
 }
 
 #[cfg(test)]
@@ -287,12 +297,16 @@ mod tests {
         let words = "record --glove /dev/g --hand left --ideal --seconds 20.5 --out";
         let typed = words.split(' ').chain(out.to_str());
         let options = Typed::parse_from(typed).record;
-        let next = once_more(&options);
+        let next = once_more(&options, options.seconds);
         let again = next.commands().next().unwrap().words();
         let again = Typed::parse_from(again.iter().skip(1)).record;
         assert_eq!(again.out, folder.path().join("hand_2.csv"));
         assert_eq!(again.at.glove, options.at.glove);
         assert!(again.at.hand == WhichHand::Left && again.at.ideal);
         assert_eq!(again.seconds, options.seconds);
+        let better = better(&options);
+        let better = better.commands().next().unwrap().words();
+        let better = Typed::parse_from(better.iter().skip(1)).record;
+        assert_eq!((better.out, better.seconds), (again.out, None));
     }
 }

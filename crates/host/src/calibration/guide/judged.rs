@@ -158,6 +158,15 @@ impl Judged {
                 .is_some_and(|said| said != self.outcome.profile.side)
     }
 
+    /// The same of the hand that the session shows, where nothing else is bad of it but that another one was said.
+    pub fn of_the_hand_shown(&self) -> Option<Self> {
+        let shown = Self {
+            declared: None,
+            ..self.clone()
+        };
+        (self.is_other_hand() && shown.verdict() != Verdict::Bad).then_some(shown)
+    }
+
     /// Everything that speaks against it, worst first.
     pub fn findings(&self) -> Vec<Finding> {
         let mut found: Vec<(Verdict, Finding)> = Vec::new();
