@@ -28,7 +28,7 @@ pub struct Bench {
     moves: Arc<AtomicBool>,
     pub arguments: Vec<String>,
     pub log: PathBuf,
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 /// Flat, then all fingers bend and stretch every 4 s.
@@ -88,7 +88,7 @@ impl Bench {
             glove_port: Some(glove_port),
             moves,
             log,
-            _folder: folder,
+            folder,
         }
     }
 
@@ -104,7 +104,7 @@ impl Bench {
 
     /// The next run's log is another file.
     pub fn log_to(&mut self, name: &str) {
-        let path = self.log.with_file_name(name);
+        let path = self.folder.path().join(name);
         self.log_at(&path);
     }
 

@@ -24,7 +24,9 @@ use crate::words::disk;
 
 /// Bytes to a chunk at most; most are closed by time.
 const CHUNK: u64 = 1 << 20;
-/// Records to a chunk at most: those of the bring-up come all at once.
+/// A chunk that has so many bytes is closed: those of the bring-up come all at once, and a full disk leaves whole chunks only.
+const FULL: usize = 64 << 10;
+/// Records to a chunk at most.
 const RECORDS: usize = 128;
 /// The topic of the trace's blocks, and their coding: the clock's reading before the block and its newest one in the block,
 /// µs, u64 little-endian; then entries as [`bridge::trace`] codes them.
@@ -94,6 +96,8 @@ pub(super) struct LogFile {
     blocks: VecDeque<Block>,
     /// When the newest record happened, µs.
     recorded: u64,
+    /// Bytes of messages in the chunk that is not closed.
+    open: usize,
     /// Log time of the newest message: it never goes back, and is never 0.
     newest: u64,
     clock: Clock,
@@ -161,6 +165,7 @@ impl LogFile {
             trace: (trace, 0),
             blocks: VecDeque::new(),
             recorded: 0,
+            open: 0,
             newest: 1,
             clock,
             written: Whole::default(),
@@ -235,7 +240,10 @@ impl LogFile {
         for (channel, message) in self.decoder.messages(record, at) {
             self.write_message(channel, record, &message)?;
         }
-        Ok(())
+        match self.open {
+            FULL.. => self.close_chunk(),
+            _ => Ok(()),
+        }
     }
 
     fn write_message(&mut self, channel: Channel, record: &Record, text: &[u8]) -> McapResult<()> {
@@ -249,6 +257,7 @@ impl LogFile {
         };
         self.sequence[index] = self.sequence[index].wrapping_add(1);
         self.writer.write_to_known_channel(&header, text)?;
+        self.open += text.len();
         self.count(at);
         Ok(())
     }
@@ -288,6 +297,7 @@ impl LogFile {
             let mut message = [block.since, block.at].map(u64::to_le_bytes).concat();
             message.extend_from_slice(&block.bytes);
             self.writer.write_to_known_channel(&header, &message)?;
+            self.open += message.len();
             self.count(at);
         }
         Ok(())
@@ -306,6 +316,7 @@ impl LogFile {
             return Err(io::Error::other(what).into());
         }
         self.writer.flush()?;
+        self.open = 0;
         self.whole = self.written;
         self.whole.bytes = self.file.stream_position()?;
         Ok(())
