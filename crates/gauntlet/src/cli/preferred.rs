@@ -319,6 +319,7 @@ model = \"mine.safetensors\"
         "commands",
         "cost",
         "dim",
+        "ends-with",
         "engage",
         "epochs",
         "epsilon",

@@ -20,4 +20,5 @@ mod log_cost;
 mod own_faults;
 mod page;
 mod stalls;
+mod taught;
 mod view;

@@ -176,7 +176,6 @@ fn parent(k: usize) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use super::super::kind;
     use super::*;
 
     /// Whether the hinges beside sensor 5, which restarted, have a heading again after two seconds of an axis `level` of whose length
@@ -184,7 +183,7 @@ mod tests {
     fn regained(level: f32) -> bool {
         let start = Instant::from_ticks(0);
         let mut joints: [Joint; SEGMENT_COUNT] = core::array::from_fn(|k| {
-            let mut joint = Joint::new(kind(k));
+            let mut joint = Joint::new(Kind::of(k));
             joint.start(0.0, start);
             joint
         });
