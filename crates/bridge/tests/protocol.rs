@@ -280,7 +280,7 @@ fn telemetry_comes_at_its_period_until_it_is_turned_off() {
 
 /// The newest telemetry sample of the next 300 ms.
 fn sample(host: &mut Host) -> Sample {
-    host.ask(Call::Telemetry { period_ms: 50 }).unwrap();
+    host.ask(Call::Telemetry { period_ms: 50 }).expect("taken");
     host.run(300 * MS);
     let mut newest = None;
     while let Some(message) = host.hear() {
