@@ -143,7 +143,7 @@ fn a_hand_that_moves_when_the_look_is_renewed_is_not_still() {
             }
         };
         bench.take(250, bent(45.0));
-        let first = bench.take(26, flat).pose.is_some();
+        let first = bench.take(25, flat).pose.is_some();
         first || (0..35).any(|_| bench.take(1, bent(jump)).pose.is_some())
     };
     assert!(found(0.0));

@@ -215,7 +215,7 @@ impl Worker {
             self.hub.lock().sample(&sample, self.clutch, blocked);
             self.devices.sample(&sample);
             if let Some(kept) = &self.kept {
-                let valid = self.status.glove_answers && !self.useless;
+                let valid = self.status.glove_answers && self.is_valid(&sample);
                 kept.sample(&sample, valid, self.devices.headings());
             }
             if let Some(samples) = &self.samples {
@@ -358,15 +358,11 @@ impl Worker {
         said.totals.count(&counters, now);
     }
 
-    /// Whether the newest sample's angles are the hand's. A bridge from before samples said it is believed but for what its
+    /// Whether a sample's angles are the hand's. A bridge from before samples said it is believed but for what its
     /// counters show.
-    fn angles_valid(&self) -> bool {
-        let told = self.sample.as_ref().and_then(Sample::is_valid);
-        told.unwrap_or(!self.useless && !self.lacks_calibration())
-    }
-
-    fn lacks_calibration(&self) -> bool {
-        self.calibration_known && !self.calibration.is_calibrated
+    fn is_valid(&self, sample: &Sample) -> bool {
+        let is_calibrated = self.calibration.is_calibrated || !self.calibration_known;
+        sample.is_valid().unwrap_or(!self.useless && is_calibrated)
     }
 
     pub fn say(&mut self) {
@@ -398,7 +394,7 @@ impl Worker {
             frame: None,
             sensors: self.devices.sensors(),
             angles: newest.map_or([0.0; glove::hand::JOINT_COUNT], |sample| sample.angles),
-            angles_valid: status.glove_answers && self.angles_valid(),
+            angles_valid: status.glove_answers && newest.is_some_and(|seen| self.is_valid(seen)),
             distrusted: self.devices.distrusted(),
             impossible: self.devices.impossible(),
             command: newest.and_then(|sample| Axes::new(&sample.command)),
