@@ -100,6 +100,16 @@ impl Files {
         Failure::new(what, self.again(pairs))
     }
 
+    /// The person ended the last stage.
+    pub fn untrained(&self, pairs: &[Taught]) -> Failure {
+        let what = format!(
+            "interrupted in the training: no model was made; the {} poses are kept in {}",
+            pairs.len(),
+            self.pairs().display()
+        );
+        Failure::new(what, self.again(pairs))
+    }
+
     /// What ended it, and how it goes on.
     pub fn goes_on(&self, error: anyhow::Error, pairs: &[Taught]) -> anyhow::Error {
         let kept = format!(

@@ -22,7 +22,7 @@ use crate::results::{self, maps};
 use crate::run::drawn;
 use crate::tell::Tell;
 use crate::web::Page;
-use host::failure::{Failure, told};
+use host::failure::{Failure, told, with_others};
 use host::interrupt::Interrupt;
 use host::next::{Command, advice};
 use host::stats::seconds;
@@ -76,12 +76,21 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
         .on_page(on_page.clone());
     let led = session.lead(&tell, interrupt);
     let done = session.finish()?;
-    if led.map_err(|error| files.goes_on(error, &done.pairs))? == Shown::Stopped {
-        return Err(files.stopped(&done.pairs).into());
+    let with_left = |error| with_others(error, done.left.iter().cloned().collect());
+    if led.map_err(|error| with_left(files.goes_on(error, &done.pairs)))? == Shown::Stopped {
+        return Err(with_left(files.stopped(&done.pairs).into()));
+    }
+    if let Some(left) = &done.left {
+        tell.say(format_args!("warning: {left}"));
     }
     lessons = done.lessons;
     let pairs = matrices(&done.pairs);
-    let finished = lessons.finish(pairs.clone(), &on_page, interrupt)?;
+    let finished = lessons
+        .finish(pairs.clone(), &on_page, interrupt)
+        .map_err(|error| match interrupt.asked() {
+            true => files.untrained(&done.pairs).into(),
+            false => files.goes_on(error, &done.pairs),
+        })?;
     on_page.show_map(aim.space(), &finished.model, &done.pairs);
     super::files::save(&finished.model, options)?;
     super::files::keep_curve(&finished.learned.curve, options);

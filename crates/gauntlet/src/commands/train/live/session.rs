@@ -42,6 +42,8 @@ pub(super) struct Done {
     pub taken_back: usize,
     /// The longest time from a pose taken to the next one.
     pub slowest: Duration,
+    /// How the gripper that was showing a pose was left, as its move says.
+    pub left: Option<String>,
 }
 
 /// A session under way.
@@ -104,8 +106,19 @@ impl<'a> Session<'a> {
         let next = "the same with | cat behind it, which prints lines instead";
         let drawn = !self.json && out::is_drawn();
         let mut live = Live::start(!drawn).or_fail(terminal, next)?;
+        let suspend = interrupt.catch_suspend().or_fail(
+            || "Ctrl-Z cannot be caught".to_owned(),
+            "ending other programs: the system lacks descriptors",
+        )?;
         loop {
             self.round(tell, drawn)?;
+            if suspend.asked() {
+                let left = self.shower.as_mut().and_then(Shower::pause);
+                live.aside(|| suspend.stop()).or_fail(terminal, next)?;
+                if let Some(left) = left {
+                    self.say(format!("{left}; g: show poses again"), false, tell, drawn);
+                }
+            }
             if interrupt.asked() || (!self.json && out::closed()) {
                 return Ok(Shown::Stopped);
             }
@@ -126,6 +139,7 @@ impl<'a> Session<'a> {
                     b'+' => Act::More,
                     // Typed right after another key.
                     b'r' => Act::Redo,
+                    b'g' if self.show_again() => continue,
                     _ => Act::Capture,
                 };
                 self.teaching.act(act, self.worn.now());
@@ -145,6 +159,19 @@ impl<'a> Session<'a> {
                 live.show(|| self.view()).or_fail(terminal, next)?;
             }
         }
+    }
+
+    /// The person's word to a gripper that shows no poses after one went wrong; whether there is such a one.
+    fn show_again(&mut self) -> bool {
+        let target = self.teaching.ask(self.worn.now()).target;
+        let Some(shower) = self.shower.as_mut().filter(|shower| shower.is_halted()) else {
+            return false;
+        };
+        shower.go_on();
+        if let Some(target) = target {
+            shower.show(&target);
+        }
+        true
     }
 
     /// Shows what is asked for on the page, and returns what was asked for there.
@@ -268,8 +295,11 @@ impl<'a> Session<'a> {
     }
 
     /// Ends the reading and the learner's thread.
-    pub fn finish(self) -> Result<Done> {
+    pub fn finish(mut self) -> Result<Done> {
+        // The gripper stands before anything else is waited for.
+        let left = self.shower.as_mut().and_then(Shower::finish);
         Ok(Done {
+            left,
             pairs: self.teaching.pairs().to_vec(),
             lessons: self.learner.end()?,
             refused: self.refused,

@@ -14,7 +14,7 @@ const SPEED: &str = "30";
 /// How hard they press: as little as can be.
 const FORCE: &str = "0";
 /// A move that was ended has held the gripper by then.
-const ENDS: Duration = Duration::from_secs(3);
+const ENDS: Duration = Duration::from_secs(5);
 const LOOK: Duration = Duration::from_millis(10);
 
 /// A gripper that shows poses.
@@ -25,6 +25,8 @@ pub(super) struct Shower {
     moving: Option<Child>,
     /// What comes next, once the move that was ended has held.
     next: Option<Vec<f32>>,
+    /// A move went wrong: none begins until a person says so.
+    halted: bool,
 }
 
 impl Shower {
@@ -34,6 +36,7 @@ impl Shower {
             model,
             moving: None,
             next: None,
+            halted: false,
         }
     }
 
@@ -41,6 +44,16 @@ impl Shower {
     pub fn show(&mut self, counts: &[f32]) {
         self.next = Some(counts.to_vec());
         self.end();
+    }
+
+    /// Whether it waits for a person's word after a move that went wrong.
+    pub fn is_halted(&self) -> bool {
+        self.halted
+    }
+
+    /// The person's word: it shows what is asked for now.
+    pub fn go_on(&mut self) {
+        self.halted = false;
     }
 
     /// Looks after the move; what went wrong with it, in a line.
@@ -59,13 +72,48 @@ impl Shower {
             }
             self.moving = None;
         }
-        if let Some(counts) = self.next.take() {
+        if wrong.is_none()
+            && !self.halted
+            && let Some(counts) = self.next.take()
+        {
             match self.begin(&counts) {
                 Ok(child) => self.moving = Some(child),
-                Err(error) => wrong = Some(format!("the gripper cannot be moved: {error}")),
+                Err(error) => wrong = Some(format!("it cannot be moved: {error}")),
             }
         }
-        wrong
+        let wrong = wrong?;
+        self.halted = true;
+        Some(format!(
+            "the gripper does not show it: {wrong}; g: show poses again"
+        ))
+    }
+
+    /// Ends a move that is under way and waits for it: what it said of how the gripper was left. `None` where none was.
+    pub fn finish(&mut self) -> Option<String> {
+        self.next = None;
+        self.end();
+        let mut child = self.moving.take()?;
+        let until = Instant::now() + ENDS;
+        loop {
+            match child.try_wait() {
+                Ok(Some(status)) if status.success() => return None,
+                Ok(None) if Instant::now() < until => std::thread::sleep(LOOK),
+                Ok(Some(_)) => return Some(format!("the gripper: {}", said(&mut child))),
+                Ok(None) | Err(_) => {
+                    let seconds = ENDS.as_secs();
+                    return Some(format!(
+                        "the gripper: the move that was ended goes on after {seconds} s; look at it"
+                    ));
+                }
+            }
+        }
+    }
+
+    /// Holds it before this program is stopped.
+    pub fn pause(&mut self) -> Option<String> {
+        let left = self.finish();
+        self.halted |= left.is_some();
+        left
     }
 
     fn begin(&self, counts: &[f32]) -> std::io::Result<Child> {
@@ -103,16 +151,7 @@ impl Shower {
 
 impl Drop for Shower {
     fn drop(&mut self) {
-        self.next = None;
-        self.end();
-        let until = Instant::now() + ENDS;
-        while let Some(child) = &mut self.moving {
-            let is_over = !matches!(child.try_wait(), Ok(None));
-            if is_over || Instant::now() > until {
-                break;
-            }
-            std::thread::sleep(LOOK);
-        }
+        let _ = self.finish();
     }
 }
 
@@ -124,8 +163,5 @@ fn said(child: &mut Child) -> String {
         let _ = stderr.take(4096).read_to_string(&mut text);
     }
     let error = text.lines().find_map(|line| line.strip_prefix("error: "));
-    format!(
-        "the gripper does not show it: {}",
-        error.unwrap_or("it says not why")
-    )
+    error.unwrap_or("it says not why").to_owned()
 }
