@@ -50,7 +50,7 @@ fn row(bytes: &[u8]) -> Option<(u8, Sensors)> {
 pub fn run(rows: &[u8], output: &mut [u8]) -> Option<usize> {
     let (mut reads, mut align, mut session) = (Reads::new(), Align::new(), Session::new());
     let mut headings: Option<Headings> = None;
-    let (mut starts, mut asked, mut length) = ([0; 16], false, 0);
+    let (mut starts, mut asked, mut length) = ([0u16; 16], false, 0);
     let mut put = |bytes: &[u8]| {
         let end = length + bytes.len();
         output.get_mut(length..end)?.copy_from_slice(bytes);
@@ -61,9 +61,9 @@ pub fn run(rows: &[u8], output: &mut [u8]) -> Option<usize> {
     for bytes in rows.chunks_exact(ROW) {
         let (prompt, sensors) = row(bytes)?;
         let frame = reads.frame(&sensors);
-        for k in 0..16 {
-            let before = core::mem::replace(&mut starts[k], reads.starts[k]);
-            if before == reads.starts[k] || before == 0 {
+        for (k, start) in starts.iter_mut().enumerate() {
+            let before = core::mem::replace(start, reads.starts[k]);
+            if before == *start || before == 0 {
                 continue;
             }
             align.forget(k);
