@@ -375,4 +375,35 @@ mod tests {
         let then = log.take().remove(0);
         assert_eq!(entries(&then.bytes, 0), [Entry::Lost { bytes: lost }]);
     }
+
+    #[test]
+    fn full_blocks_follow_one_another_and_behind_a_hole_nothing_is_taken() {
+        let log = TraceLog::new();
+        let bytes = vec![7; 1_000];
+        let read = Entry::Read {
+            port: 1,
+            bytes: &bytes,
+        };
+        for turn in 1..=100 {
+            log.waited();
+            log.clock(Instant::from_ticks(1_000 * turn));
+            log.note(&read);
+        }
+        let blocks = log.take();
+        assert!(blocks.len() > 2, "{}", blocks.len());
+        let follow = |pair: &[Block]| pair[0].at == pair[1].since;
+        assert!(blocks.windows(2).all(follow), "{blocks:?}");
+        let all = blocks
+            .iter()
+            .map(|block| entries(&block.bytes, block.since).len());
+        assert_eq!(all.sum::<usize>(), 200);
+        // More than there is room for, and then something small.
+        let large = vec![7; MOST];
+        log.note(&Entry::Read {
+            port: 1,
+            bytes: &large,
+        });
+        log.note(&read);
+        assert_eq!(log.take(), []);
+    }
 }

@@ -352,6 +352,7 @@ fn what_a_bridge_on_a_chip_tells_is_handed_to_who_keeps_it_at_this_computers_tim
     let bridge = Scripted::start();
     let link = HostLink::connect(&bridge.address()).unwrap();
     let clock = Clock::start();
+    let begin = clock.now();
     let (feed, records) = queue(10_000);
     let session = OnChip::start(link, clock, None, Some(feed)).unwrap();
     assert!(session.order(Order::Engage));
@@ -360,7 +361,8 @@ fn what_a_bridge_on_a_chip_tells_is_handed_to_who_keeps_it_at_this_computers_tim
     let kept: Vec<Record> = records.records.iter().collect();
     let end = clock.now();
     assert!(
-        kept.iter().all(|record| record.at() <= end),
+        kept.iter()
+            .all(|record| begin <= record.at() && record.at() <= end),
         "the bridge's own time"
     );
     let count = |what: fn(&Record) -> bool| kept.iter().filter(|record| what(record)).count();
