@@ -114,7 +114,7 @@ fn in_pinch_mode_one_number_never_makes_fingers_and_scissor_meet() {
     let refused = refusal(&bench(&["mode", "pinch"], &path), 1);
     assert!(refused.contains("57, 176, 249"), "{refused}");
     let said = moved("142");
-    assert_eq!(said["fault"]["code"], "00", "{said}");
+    assert!(said["fault"].is_null(), "{said}");
     let place = gripper.positions();
     assert!(
         place[..3].iter().all(|at| (at - 142.0).abs() < 3.0),
