@@ -4,7 +4,12 @@
 //! `cargo run --release -p paper --example starts -- sp2 fast 1-8 12 0.03 >> starts.csv`: data (sp1 to sp4, hand, or a recording),
 //! schedule (`fast`, `paper`, or `fast,NAME=VALUE,…`), seeds, starts a seed, deviation of normal weights or `glorot`. One line for each
 //! look at each start: at the end of the early stages, before λ3 rises, half risen, risen, thrice between, and at the end; with the
-//! measures of its end on held-out samples. With `best12` for the starts they are trained as `train` does, one line a seed.
+//! measures of its end on held-out samples. Other words for the starts:
+//! - `apart12`: the same, and a target near one that was shown counts as covered (as where a person teaches);
+//! - `best12`: trained as `train` does, one line a seed;
+//! - `taught12`: the same with the pairs of the first start for all, there from the first epoch;
+//! - `pairs12`: the early stages alone, one line a pair: how far its target is from the image and from the nearest target that was
+//!   shown before, and whether `apart` would choose another.
 
 #[path = "common/domain.rs"]
 mod domain;
@@ -13,15 +18,19 @@ use core::ops::ControlFlow;
 use domain::{Domain, Result, domain};
 use std::time::Instant;
 use trainer::algorithm::starts::Usual;
-use trainer::algorithm::{InUnits, Plan, Schedule, Settings, Starts, Trainer, start_seed};
+use trainer::algorithm::{
+    Advance, InUnits, PairPlan, Plan, Schedule, Settings, Starts, Trainer, start_seed,
+};
 use trainer::cost::fast::evaluate;
 use trainer::data::Pairs;
 use trainer::measures::{NEIGHBOURS, fold_factor, measure, occupancy};
 use trainer::network::Initialisation;
+use trainer::operator::Operator;
 
 /// The columns of a line for each look, and of one for each seed.
 const EACH: &str =
     "data,schedule,normal,seed,start,epoch,recon,dist,ucdx,ucdq,votrain,fold,s,pin,d,vo,dknn,nmse";
+const PAIRS: &str = "data,schedule,normal,seed,start,pair,size,gap,apart,other,target";
 const BEST: &str = "data,schedule,normal,seed,starts,taken,d,vo,dknn,nmse,s,costs";
 
 fn plan(word: &str, dimensions: usize) -> Result<Plan> {
@@ -72,8 +81,73 @@ fn looks(plan: &Plan, pairs: usize) -> Vec<usize> {
     ]
 }
 
+/// What is done with the starts of a seed.
+#[derive(Clone, Copy, PartialEq)]
+enum Mode {
+    Each,
+    Apart,
+    Best,
+    Taught,
+    Pairs,
+}
+
+impl Mode {
+    fn parse(word: &str) -> Result<(Self, usize)> {
+        let named = [
+            ("apart", Self::Apart),
+            ("best", Self::Best),
+            ("taught", Self::Taught),
+            ("pairs", Self::Pairs),
+            ("", Self::Each),
+        ];
+        for (name, mode) in named {
+            if let Some(count) = word.strip_prefix(name) {
+                return Ok((mode, count.parse()?));
+            }
+        }
+        Err("starts".into())
+    }
+
+    fn is_one_by_one(self) -> bool {
+        matches!(self, Self::Each | Self::Apart | Self::Pairs)
+    }
+
+    fn columns(self) -> &'static str {
+        match self {
+            Self::Each | Self::Apart => EACH,
+            Self::Pairs => PAIRS,
+            Self::Best | Self::Taught => BEST,
+        }
+    }
+}
+
+/// Trains to the end; a target near one that was shown counts as covered where `apart`.
+fn to_the_end(
+    trainer: &mut Trainer,
+    operator: &mut dyn Operator,
+    each: usize,
+    apart: bool,
+    watch: &mut dyn FnMut(&Trainer),
+) -> Result<()> {
+    loop {
+        match trainer.advance(each - trainer.epoch() % each)? {
+            Advance::NeedsPair(target) => {
+                let shown = trainer.pairs().targets.clone();
+                let other = trainer.farthest_target(&shown).filter(|_| apart);
+                let target = other.unwrap_or(target);
+                trainer.show_for(&target, &operator.demonstrate(&target)?)?;
+            }
+            Advance::Trained => watch(trainer),
+            Advance::Done => {
+                watch(trainer);
+                return Ok(());
+            }
+        }
+    }
+}
+
 /// One start, with a line for each look.
-fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
+fn start(domain: &mut Domain, settings: &Settings, apart: bool, label: &str) -> Result<()> {
     let looks = looks(&settings.schedule.plan(), settings.pairs.count());
     let begin = Instant::now();
     let mut trainer = Trainer::new(&domain.train, &domain.targets, settings)?;
@@ -87,7 +161,7 @@ fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
         input: &domain.units.0,
         target: &domain.units.1,
     };
-    trainer.train_with(&mut operator, each, &mut |trainer| {
+    to_the_end(&mut trainer, &mut operator, each, apart, &mut |trainer| {
         if looks.contains(&trainer.epoch()) {
             let networks = trainer.networks();
             let (parts, _) = evaluate(
@@ -111,7 +185,6 @@ fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
             ];
             rows.push((trainer.epoch(), row, trainer.progress().parts.pin));
         }
-        ControlFlow::Continue(())
     })?;
     let m = measure(&trainer.networks().f, &domain.test());
     for (epoch, row, pin) in &rows {
@@ -129,15 +202,24 @@ fn start(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
 }
 
 /// The machine itself: the map that is taken of so many starts, and what each start cost when it was judged last.
-fn best(domain: &mut Domain, settings: &Settings, count: usize, label: &str) -> Result<()> {
+fn best(
+    domain: &mut Domain,
+    settings: &Settings,
+    (mode, count): (Mode, usize),
+    label: &str,
+) -> Result<()> {
     let begin = Instant::now();
+    let mut settings = settings.clone();
+    if mode == Mode::Taught {
+        settings.pairs = PairPlan::Fixed(taught(domain, &settings)?);
+    }
     let usual = match domain.truth {
         Some(_) => Usual::of_target(domain.targets.cols),
         None => Usual::HAND,
     };
     let mut starts = Starts::new(
         (&domain.train, &domain.targets),
-        settings,
+        &settings,
         usual.several(count),
     )?;
     let mut operator = InUnits {
@@ -167,6 +249,74 @@ fn best(domain: &mut Domain, settings: &Settings, count: usize, label: &str) -> 
     Ok(())
 }
 
+/// The distance from a point to the nearest of some; infinite from none.
+fn gap<'a>(point: &[f32], to: impl Iterator<Item = &'a [f32]>) -> f64 {
+    let square = |other: &[f32]| -> f64 {
+        let pairs = point.iter().zip(other);
+        pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
+    };
+    to.map(square).fold(f64::INFINITY, f64::min).sqrt()
+}
+
+/// A line for each pair that a start asks for.
+fn choice(domain: &mut Domain, settings: &Settings, label: &str) -> Result<()> {
+    let mut trainer = Trainer::new(&domain.train, &domain.targets, settings)?;
+    let mut operator = InUnits {
+        operator: domain.operator.as_mut(),
+        input: &domain.units.0,
+        target: &domain.units.1,
+    };
+    let all = settings.pairs.start().inputs.rows + settings.pairs.count();
+    while trainer.pairs().inputs.rows < all {
+        let Advance::NeedsPair(target) = trainer.advance(usize::MAX)? else {
+            continue;
+        };
+        let networks = trainer.networks();
+        let images: Vec<Vec<f32>> = (domain.train.iter_rows())
+            .map(|q| networks.f.eval(q))
+            .collect();
+        let shown = trainer.pairs().targets.clone();
+        let size = {
+            let count = images.len() as f64;
+            let spread = |i: usize| {
+                let mean = images.iter().map(|p| f64::from(p[i])).sum::<f64>() / count;
+                let square = |p: &Vec<f32>| (f64::from(p[i]) - mean).powi(2);
+                images.iter().map(square).sum::<f64>() / count
+            };
+            (0..target.len()).map(spread).sum::<f64>().sqrt()
+        };
+        let other = trainer.farthest_target(&shown).unwrap_or_default();
+        let words: Vec<String> = target.iter().map(|v| format!("{v:.3}")).collect();
+        println!(
+            "{label},{},{size:.4},{:.4},{:.4},{:.4},{}",
+            shown.rows + 1,
+            gap(&target, images.iter().map(Vec::as_slice)),
+            gap(&target, shown.iter_rows()),
+            gap(&target, core::iter::once(&other[..])),
+            words.join(" ")
+        );
+        trainer.show(&operator.demonstrate(&target)?)?;
+    }
+    Ok(())
+}
+
+/// The pairs that the first start asks for.
+fn taught(domain: &mut Domain, settings: &Settings) -> Result<Pairs> {
+    let mut trainer = Trainer::new(&domain.train, &domain.targets, settings)?;
+    let mut operator = InUnits {
+        operator: domain.operator.as_mut(),
+        input: &domain.units.0,
+        target: &domain.units.1,
+    };
+    let all = settings.pairs.start().inputs.rows + settings.pairs.count();
+    while trainer.pairs().inputs.rows < all {
+        if let Advance::NeedsPair(target) = trainer.advance(usize::MAX)? {
+            trainer.show(&operator.demonstrate(&target)?)?;
+        }
+    }
+    Ok(trainer.pairs().clone())
+}
+
 fn gcd(a: usize, b: usize) -> usize {
     if b == 0 { a } else { gcd(b, a % b) }
 }
@@ -177,11 +327,9 @@ fn main() -> Result<()> {
         return Err("DATA SCHEDULE SEEDS STARTS DEVIATION|glorot".into());
     };
     let (first, last) = seeds.split_once('-').unwrap_or((seeds, seeds));
-    let (each, count) = match starts.strip_prefix("best") {
-        Some(count) => (false, count.parse::<usize>()?),
-        None => (true, starts.parse()?),
-    };
-    println!("{}", if each { EACH } else { BEST });
+    let (mode, count) = Mode::parse(starts)?;
+    let each = mode.is_one_by_one();
+    println!("{}", mode.columns());
     for seed in first.parse::<u64>()?..=last.parse::<u64>()? {
         for number in 0..if each { count } else { 1 } {
             let mut domain = domain(data, seed)?;
@@ -196,9 +344,18 @@ fn main() -> Result<()> {
             let name = data.rsplit('/').next().unwrap_or(data);
             let label = format!("{name},{},{normal},{seed}", schedule.replace(',', ";"));
             if each {
-                start(&mut domain, &settings, &format!("{label},{number}"))?;
+                let label = format!("{label},{number}");
+                match mode {
+                    Mode::Pairs => choice(&mut domain, &settings, &label)?,
+                    _ => start(&mut domain, &settings, mode == Mode::Apart, &label)?,
+                }
             } else {
-                best(&mut domain, &settings, count, &format!("{label},{count}"))?;
+                best(
+                    &mut domain,
+                    &settings,
+                    (mode, count),
+                    &format!("{label},{starts}"),
+                )?;
             }
         }
     }

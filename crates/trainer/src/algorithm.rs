@@ -20,7 +20,7 @@ mod tests;
 pub use check::{Error, Warning};
 pub use drive::{InUnits, Nobody};
 pub use settings::{PairPlan, Plan, Schedule, Settings};
-pub use starts::{Answers, Several, Starts, start_seed};
+pub use starts::{Several, Starts, start_seed};
 
 use crate::cost::engine::Engine;
 use crate::cost::reference::Autoencoder;
@@ -246,22 +246,6 @@ impl Trainer {
             epochs: self.epoch,
             parts: self.parts,
         }
-    }
-
-    /// Whether every pair that it will ask for is there.
-    fn has_all_pairs(&self) -> bool {
-        match &self.settings.pairs {
-            PairPlan::Fixed(_) => true,
-            PairPlan::Adaptive { start, count } => {
-                self.pairs.inputs.rows >= start.inputs.rows + count
-            }
-        }
-    }
-
-    /// Another pair in place of the one that it asks for.
-    fn take_pair(&mut self, input: &[f32], target: Vec<f32>) -> Result<(), Error> {
-        self.needs = Some(target);
-        self.show(input)
     }
 
     /// That it was ended after so many epochs, of which nothing else is known.

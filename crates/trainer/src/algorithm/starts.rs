@@ -15,7 +15,7 @@ mod tests;
 mod usual;
 
 pub use cuts::Cut;
-pub use several::{Answers, Judge, MOST, Several, Standing, Start};
+pub use several::{Judge, MOST, Several, Standing, Start};
 pub use usual::Usual;
 
 use super::{Advance, Error, Settings, Trained, Trainer, Warning};
@@ -25,7 +25,7 @@ use crate::pool::Pool;
 use crate::random::Random;
 use core::ops::ControlFlow;
 use core::time::Duration;
-use runner::{Runner, judging, nearest_unused};
+use runner::{Runner, judging};
 
 /// Random numbers of the seeds of further starts.
 const SEED_STREAM: u64 = 0x5354_4152;
@@ -134,15 +134,12 @@ impl Starts {
         let Some(limit) = self.cuts.get(self.made).map(|cut| cut.epoch) else {
             return Ok(Advance::Done);
         };
-        let alone = self.is_first_alone();
         let mut ready: Vec<&mut Runner> = (self.runners.iter_mut())
-            .take(if alone { 1 } else { usize::MAX })
             .filter(|runner| runner.is_live && runner.trainer.epoch() < limit)
             .collect();
         self.pool
             .for_each(&mut ready, |runner| runner.advance(epochs, limit));
         self.end_diverged()?;
-        self.answer_from_shown();
         if let Some(target) = self.asked() {
             return Ok(Advance::NeedsPair(target));
         }
@@ -280,31 +277,6 @@ impl Starts {
 
     fn asked(&self) -> Option<Vec<f32>> {
         self.runners.iter().find_map(|runner| runner.asks.clone())
-    }
-
-    /// A person shows all pairs to the first start before the others begin.
-    fn is_first_alone(&self) -> bool {
-        self.several.answers == Answers::Once && !self.runners[0].trainer.has_all_pairs()
-    }
-
-    /// What a person has shown answers for the further starts.
-    fn answer_from_shown(&mut self) {
-        let Some((first, others)) = self.runners.split_first_mut() else {
-            return;
-        };
-        if self.several.answers != Answers::Once {
-            return;
-        }
-        for runner in others {
-            let Some(target) = &runner.asks else { continue };
-            let shown = first.trainer.pairs();
-            if let Some((input, target)) = nearest_unused(shown, runner.trainer.pairs(), target) {
-                // It was taken by the first, so it fits.
-                if runner.trainer.take_pair(&input, target).is_ok() {
-                    runner.asks = None;
-                }
-            }
-        }
     }
 
     /// Ends the starts whose weights are no longer finite, unless all are.

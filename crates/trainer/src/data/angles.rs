@@ -1,8 +1,9 @@
 //! Columns of joint angles: radians or degrees, within a full turn, brought to ±π.
 
+use super::error::Error;
+use super::matrix::Matrix;
 use super::names::Unit;
 use super::table::Table;
-use super::{Error, Matrix};
 use core::f64::consts::{PI, TAU};
 
 /// From here on a file without a word about its unit may be in degrees. Radians do not get there: five turns.

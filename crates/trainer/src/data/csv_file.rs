@@ -2,42 +2,36 @@
 //! other domain. Columns are found by name, in any order; columns that nobody asked for are passed over. How tables are taken as people
 //! have them: [`Table`].
 
+use super::error::Error;
+use super::matrix::Matrix;
+use super::samples::{Pairs, Poses};
 use super::table::{Columns, Table};
-use super::{Error, Matrix};
+use super::{angles, times};
 use crate::whole_file;
 use std::path::Path;
 
-/// Frames of joint angles.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Poses {
-    /// Time of each frame in seconds, strictly growing; `None` when the file has no column `time_s`.
-    pub time_s: Option<Vec<f64>>,
-    /// The angles, radians, one frame a row.
-    pub rows: Matrix,
-}
+impl Table {
+    /// Poses: the columns `joint_names` in radians, and the time if there.
+    ///
+    /// # Errors
+    /// Any of [`Error`], with file, column, row and value.
+    pub fn poses(&mut self, joint_names: &[&str]) -> Result<Poses, Error> {
+        let rows = angles::read(self, joint_names)?;
+        self.at_least(1)?;
+        times::read(self, rows)
+    }
 
-/// Reference pairs or ground truth: row i of `inputs` belongs to row i of `targets`.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Pairs {
-    /// Input samples.
-    pub inputs: Matrix,
-    /// Target samples.
-    pub targets: Matrix,
-}
-
-impl Pairs {
-    /// `count` of these pairs at equal distances around their ring: number round(i·M/`count`) of M, for i = 1 … `count`, the last
-    /// being the first of the ring. Nothing from no pairs.
-    #[must_use]
-    pub fn spaced(&self, count: usize) -> Self {
-        let ring = self.inputs.rows.max(1);
-        let places: Vec<usize> = (1..=count)
-            .map(|i| (2 * i * ring + count) / (2 * count) % ring)
-            .collect();
-        Self {
-            inputs: self.inputs.select(&places),
-            targets: self.targets.select(&places),
-        }
+    /// A hand's pairs: the columns `inputs` in radians, then the columns `targets`.
+    ///
+    /// # Errors
+    /// Any of [`Error`].
+    pub fn hand_pairs(&mut self, inputs: &[&str], targets: &[&str]) -> Result<Pairs, Error> {
+        let pairs = Pairs {
+            inputs: angles::read(self, inputs)?,
+            targets: self.columns(targets)?,
+        };
+        self.at_least(1)?;
+        Ok(pairs)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What can be wrong with a file of samples.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::remedy::Remedy;
 use crate::whole_file;
@@ -238,4 +238,19 @@ impl core::fmt::Display for Named<'_> {
         }
         Ok(())
     }
+}
+
+/// Says clearly that a file has fewer samples than the work at hand needs (training needs more samples than pairs, and some to hold out).
+///
+/// # Errors
+/// [`Error::TooFewRows`].
+pub fn require_rows(file: &Path, found: usize, needed: usize) -> Result<(), Error> {
+    if found < needed {
+        return Err(Error::TooFewRows {
+            file: file.to_owned(),
+            found,
+            needed,
+        });
+    }
+    Ok(())
 }

@@ -1,9 +1,9 @@
 //! A table of samples in memory: columns found by name, numbers as people write them, and what was taken otherwise than it stands.
 
-use super::error::{Field, Row};
+use super::error::{Error, Field, Row, require_rows};
+use super::matrix::Matrix;
 use super::names::{Name, Unit};
 use super::text::{LONGEST, Separator, Sheet};
-use super::{Error, Matrix, Pairs, Poses, angles, require_rows, times};
 use crate::whole_file;
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -94,29 +94,6 @@ impl Table {
 
     pub(super) fn note(&mut self, note: String) {
         self.notes.push(note);
-    }
-
-    /// Poses: the columns `joint_names` in radians, and the time if there.
-    ///
-    /// # Errors
-    /// Any of [`Error`], with file, column, row and value.
-    pub fn poses(&mut self, joint_names: &[&str]) -> Result<Poses, Error> {
-        let rows = angles::read(self, joint_names)?;
-        self.at_least(1)?;
-        times::read(self, rows)
-    }
-
-    /// A hand's pairs: the columns `inputs` in radians, then the columns `targets`.
-    ///
-    /// # Errors
-    /// Any of [`Error`].
-    pub fn hand_pairs(&mut self, inputs: &[&str], targets: &[&str]) -> Result<Pairs, Error> {
-        let pairs = Pairs {
-            inputs: angles::read(self, inputs)?,
-            targets: self.columns(targets)?,
-        };
-        self.at_least(1)?;
-        Ok(pairs)
     }
 
     /// Samples of any domain: the columns `<prefix>0`, `<prefix>1`, … as many as the header has.
@@ -352,7 +329,7 @@ impl Table {
         text.replacen(',', ".", 1).parse().ok()
     }
 
-    fn at_least(&self, needed: usize) -> Result<(), Error> {
+    pub(super) fn at_least(&self, needed: usize) -> Result<(), Error> {
         require_rows(&self.file, self.rows.len(), needed)
     }
 }

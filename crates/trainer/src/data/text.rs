@@ -1,6 +1,6 @@
 //! From the bytes of a file to the fields of its rows: the encoding, the line of the header, what stands between the fields.
 
-use super::Error;
+use super::error::Error;
 use super::names::Name;
 use std::path::Path;
 

@@ -1,8 +1,10 @@
 //! The time of a recording: seconds, milliseconds or numbers of frames; anew with each clip; the same frame twice.
 
+use super::error::Error;
+use super::matrix::Matrix;
 use super::names::Unit;
+use super::samples::Poses;
 use super::table::Table;
-use super::{Error, Matrix, Poses};
 
 /// Frames a second where only their numbers are known.
 const FRAMES_HZ: f64 = 30.0;

@@ -1,13 +1,13 @@
 //! All starts of a training in one file: the checkpoints of those in the running, and what became of the others.
 
-use super::{Answers, Judge, Several, Starts};
+use super::{Judge, Starts};
 use crate::algorithm::checkpoint::{Error, broken, digest, read_file, write_file};
 use safetensors::tensor::{Dtype, SafeTensors, TensorView};
 use std::collections::HashMap;
 use std::path::Path;
 
 /// Version of this file's meaning. A single start's file is that of its trainer.
-const VERSION: &str = "4 starts";
+const VERSION: &str = "5 starts";
 const DIGEST: &str = "state_sha256";
 
 /// The array of a start's own checkpoint.
@@ -61,7 +61,7 @@ impl Starts {
         let words = [
             ("version", VERSION.to_owned()),
             ("starts", self.runners.len().to_string()),
-            ("answers", words_of(&self.several)),
+            ("judge", word_of_judge(self.several.judge).to_owned()),
             ("cuts", format!("{:?}", self.cuts)),
             ("made", self.made.to_string()),
             ("fates", fates.join(", ")),
@@ -125,7 +125,7 @@ impl Starts {
         if word_of(DIGEST)? != state {
             return Err(broken("it is not as it was written: its digest is another"));
         }
-        if word_of("answers")? != words_of(&self.several)
+        if word_of("judge")? != word_of_judge(self.several.judge)
             || word_of("cuts")? != format!("{:?}", self.cuts)
         {
             return Err(Error::OtherSettings);
@@ -168,15 +168,9 @@ impl Starts {
     }
 }
 
-/// Who answers, and by what is judged.
-fn words_of(several: &Several) -> String {
-    let answers = match several.answers {
-        Answers::ForEach => "for each",
-        Answers::Once => "once",
-    };
-    let judge = match several.judge {
+fn word_of_judge(judge: Judge) -> &'static str {
+    match judge {
         Judge::Cost => "cost",
         Judge::CostInTarget => "cost in target",
-    };
-    format!("{answers}, {judge}")
+    }
 }

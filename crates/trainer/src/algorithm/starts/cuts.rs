@@ -120,6 +120,29 @@ mod tests {
     }
 
     #[test]
+    fn the_cuts_of_the_fast_schedule_are_those_that_were_measured() {
+        let cuts = Cut::all(&Schedule::Fast.plan_for(2), 4, 32);
+        let told: Vec<(usize, usize, bool)> = (cuts.iter())
+            .map(|cut| (cut.epoch, cut.keep, cut.attraction))
+            .collect();
+        // 1,200 early epochs; λ3 rises from 2,000 to 2,500.
+        let want = [
+            (2000, 22, false),
+            (2250, 16, true),
+            (2500, 6, true),
+            (3350, 3, true),
+            (4200, 1, true),
+        ];
+        assert_eq!(told, want);
+        // Where a step with attraction costs six without: 11 whole trainings, of 15,200 each.
+        let price = |epochs: Range<usize>| {
+            let with = epochs.end.max(2000) - epochs.start.max(2000);
+            (epochs.len() - with + 6 * with) as f64
+        };
+        assert_eq!(seconds((&cuts, 32), (0, 0), (1, 1), &price), 166_900.0);
+    }
+
+    #[test]
     fn two_starts_on_two_threads_take_the_first_stretch_at_once_and_help_each_other_in_the_second()
     {
         let cut = |epoch| Cut {

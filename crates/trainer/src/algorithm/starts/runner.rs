@@ -1,9 +1,9 @@
-//! One of the starts: trained, judged, given what a person has shown.
+//! One of the starts: trained, and judged.
 
 use super::Judge;
 use crate::algorithm::{Advance, Error, Settings, Trainer};
 use crate::cost::{Weights, fast};
-use crate::data::{Matrix, Pairs};
+use crate::data::Matrix;
 
 /// One of the starts.
 pub(super) struct Runner {
@@ -59,30 +59,4 @@ pub(super) fn judging((settings, judge): (&Settings, Judge), attraction: bool) -
         true => Weights { pin: 0.0, ..full },
         false => full,
     }
-}
-
-/// Of the pairs that were shown, the one that is not among `used` yet and whose target is nearest to `wanted`. A pair that was shown
-/// twice is there twice.
-pub(super) fn nearest_unused(
-    shown: &Pairs,
-    used: &Pairs,
-    wanted: &[f32],
-) -> Option<(Vec<f32>, Vec<f32>)> {
-    let row = |pairs: &Pairs, row: usize| {
-        [pairs.inputs.row(row), pairs.targets.row(row)].map(<[f32]>::to_vec)
-    };
-    let mut left: Vec<[Vec<f32>; 2]> = (0..shown.inputs.rows).map(|n| row(shown, n)).collect();
-    for pair in (0..used.inputs.rows).map(|n| row(used, n)) {
-        if let Some(place) = left.iter().position(|other| *other == pair) {
-            left.remove(place);
-        }
-    }
-    let distance = |target: &[f32]| -> f32 {
-        let pairs = target.iter().zip(wanted);
-        pairs.map(|(a, b)| (a - b) * (a - b)).sum()
-    };
-    let nearest = left
-        .into_iter()
-        .min_by(|[_, a], [_, b]| distance(a).total_cmp(&distance(b)));
-    nearest.map(|[input, target]| (input, target))
 }

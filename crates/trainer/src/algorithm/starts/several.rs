@@ -1,20 +1,10 @@
-//! How many starts, how they are answered and judged, and what is told of them.
+//! How many starts, by what they are judged, and what is told of them.
 
 use crate::algorithm::Progress;
 use core::time::Duration;
 
 /// Most starts of a training.
 pub const MOST: usize = 64;
-
-/// Who answers when a start asks for a pair.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Answers {
-    /// Whoever answers does so at no cost, a script or a truth: each start asks for pairs of its own.
-    ForEach,
-    /// A person, who shows each pose once: the first start asks, and the others take its pairs, each in an order of its own
-    /// (the pair whose target is nearest to the one it would ask for).
-    Once,
-}
 
 /// By what starts are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,13 +16,11 @@ pub enum Judge {
     CostInTarget,
 }
 
-/// How many starts, who answers them, and by what they are judged.
+/// How many starts, and by what they are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Several {
     /// Starts, at least one.
     pub count: usize,
-    /// Who shows pairs.
-    pub answers: Answers,
     /// By what they are judged.
     pub judge: Judge,
 }
@@ -41,7 +29,6 @@ impl Several {
     /// One start: Algorithm 1 as it stands.
     pub const ONE: Self = Self {
         count: 1,
-        answers: Answers::ForEach,
         judge: Judge::Cost,
     };
 }

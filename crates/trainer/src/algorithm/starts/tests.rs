@@ -12,17 +12,16 @@ fn settings(threads: usize) -> Settings {
     }
 }
 
-fn several(count: usize, answers: Answers) -> Several {
+fn several(count: usize) -> Several {
     Several {
         count,
-        answers,
         judge: Judge::Cost,
     }
 }
 
-fn starts(count: usize, threads: usize, answers: Answers) -> Starts {
+fn starts(count: usize, threads: usize) -> Starts {
     let (q, x) = samples();
-    Starts::new((&q, &x), &settings(threads), several(count, answers)).unwrap()
+    Starts::new((&q, &x), &settings(threads), several(count)).unwrap()
 }
 
 fn go_on(_: &mut Starts) -> ControlFlow<()> {
@@ -45,7 +44,7 @@ fn one_start_is_the_trainer_s_map_to_the_bit() {
         .train_with(&mut above(), 50, go_on)
         .unwrap()
         .unwrap();
-    let mut one = starts(1, 1, Answers::ForEach);
+    let mut one = starts(1, 1);
     assert_eq!(flat(&train(&mut one, 50)), flat(&want));
     assert_eq!(one.starts()[0].seed, settings(1).seed);
     assert!(one.starts()[0].cost.is_some_and(f64::is_finite));
@@ -53,10 +52,10 @@ fn one_start_is_the_trainer_s_map_to_the_bit() {
 
 #[test]
 fn threads_and_pauses_change_no_bit_of_what_several_starts_bring() {
-    let mut one = starts(7, 1, Answers::ForEach);
+    let mut one = starts(7, 1);
     let want = flat(&train(&mut one, 50));
     for (threads, each) in [(2, 7), (3, 150), (16, 1)] {
-        let mut other = starts(7, threads, Answers::ForEach);
+        let mut other = starts(7, threads);
         assert_eq!(
             flat(&train(&mut other, each)),
             want,
@@ -68,7 +67,7 @@ fn threads_and_pauses_change_no_bit_of_what_several_starts_bring() {
 
 #[test]
 fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
-    let mut all = starts(13, 2, Answers::ForEach);
+    let mut all = starts(13, 2);
     train(&mut all, 50);
     let total = all.total();
     let fates = all.starts();
@@ -93,10 +92,8 @@ fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
     assert_eq!(dear, 13 - first.keep);
 }
 
-#[test]
-fn the_cost_that_judges_is_equation_13_without_pin_over_all_samples() {
-    let mut two = starts(2, 1, Answers::ForEach);
-    let trained = train(&mut two, 50);
+/// The parts of Eq. 13 of a map over all samples, by the slow witness.
+fn parts_of(trained: &Trained, weights: &Weights) -> crate::cost::Parts {
     let (q, x) = samples();
     let lists = |m: &Matrix| -> Vec<Vec<f64>> {
         m.iter_rows()
@@ -114,25 +111,143 @@ fn the_cost_that_judges_is_equation_13_without_pin_over_all_samples() {
         pair_q: &[],
         pair_x: &[],
     };
+    crate::cost::reference::evaluate(&networks, &data, weights).0
+}
+
+/// What the start that is taken cost at its end.
+fn cost_of_taken(starts: &Starts) -> f64 {
+    let fates = starts.starts();
+    let taken = fates.iter().find(|start| start.is_live);
+    taken.and_then(|start| start.cost).unwrap()
+}
+
+#[test]
+fn the_cost_that_judges_is_equation_13_without_pin_over_all_samples() {
+    let mut two = starts(2, 1);
+    let trained = train(&mut two, 50);
     let full = two.settings.cost.weights(&two.settings.lambda);
-    let (parts, _) = crate::cost::reference::evaluate(&networks, &data, &full);
-    let want = parts.total(&Weights { pin: 0.0, ..full });
-    let found = two
-        .starts()
-        .into_iter()
-        .find(|start| start.is_live)
-        .unwrap()
-        .cost
-        .unwrap();
+    let want = parts_of(&trained, &full).total(&Weights { pin: 0.0, ..full });
+    let found = cost_of_taken(&two);
     assert!((found / want - 1.0).abs() < 1e-4, "{found} {want}");
 }
 
 #[test]
+fn a_hand_s_cost_leaves_out_what_is_measured_in_the_input_domain() {
+    let (q, x) = samples();
+    let in_target = Several {
+        judge: Judge::CostInTarget,
+        ..several(2)
+    };
+    let mut two = Starts::new((&q, &x), &settings(1), in_target).unwrap();
+    let trained = train(&mut two, 50);
+    let full = two.settings.cost.weights(&two.settings.lambda);
+    let parts = parts_of(&trained, &full);
+    let want = parts.reconstruction
+        + full.distortion * parts.distortion
+        + full.attraction * parts.target_chamfer;
+    let found = cost_of_taken(&two);
+    assert!((found / want - 1.0).abs() < 1e-4, "{found} {want}");
+    // It says something else than the whole.
+    assert!(full.attraction * parts.input_chamfer > 0.01 * want);
+}
+
+#[test]
+fn before_attraction_begins_to_rise_starts_are_judged_without_it() {
+    let mut all = starts(12, 1);
+    let before = all.cuts[0];
+    assert!(!before.attraction && all.cuts[1].attraction);
+    while all.made == 0 {
+        if let Advance::NeedsPair(target) = all.advance(1).unwrap() {
+            all.show(&above().demonstrate(&target).unwrap()).unwrap();
+        }
+    }
+    let full = all.settings.cost.weights(&all.settings.lambda);
+    let none = Weights {
+        pin: 0.0,
+        attraction: 0.0,
+        ..full
+    };
+    for runner in &all.runners {
+        let want = parts_of(&runner.trainer.trained(), &full).total(&none);
+        let found = runner.cost.unwrap();
+        assert!((found / want - 1.0).abs() < 1e-4, "{found} {want}");
+    }
+}
+
+#[test]
+fn every_start_has_weights_and_batches_of_its_own_and_the_first_the_training_s_seed() {
+    let seeds: Vec<u64> = (0..MOST).map(|number| start_seed(7, number)).collect();
+    assert_eq!(seeds[0], 7);
+    let mut sorted = seeds.clone();
+    sorted.sort_unstable();
+    sorted.dedup();
+    assert_eq!(sorted.len(), MOST);
+    let all = starts(3, 1);
+    let weights = |number: usize| flat(&all.runners[number].trainer.trained());
+    assert!(weights(0) != weights(1) && weights(1) != weights(2) && weights(0) != weights(2));
+    assert_eq!(
+        all.starts().iter().map(|s| s.seed).collect::<Vec<u64>>(),
+        seeds[..3]
+    );
+}
+
+#[test]
+fn what_is_said_of_the_map_is_said_of_the_one_that_is_taken_and_once() {
+    let (mut q, x) = samples();
+    // A column that never changes is told of the samples.
+    for row in 0..q.rows {
+        q.row_mut(row)[2] = 0.5;
+    }
+    let mut all = Starts::new((&q, &x), &settings(2), several(5)).unwrap();
+    let mut said = Vec::new();
+    let mut flat_above = Flat;
+    all.train_with(&mut flat_above, 10, &mut |starts| {
+        said.extend(starts.take_warnings());
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    let constant = |warning: &&Warning| matches!(warning, Warning::ConstantColumn { .. });
+    assert_eq!(said.iter().filter(constant).count(), 1, "{said:?}");
+    let taken = &all.runners[all.best()].trainer;
+    let alone = {
+        let mut alone = Trainer::new(
+            &q,
+            &x,
+            &Settings {
+                seed: all.runners[all.best()].seed,
+                ..settings(1)
+            },
+        )
+        .unwrap();
+        alone.take_warnings();
+        let go_on = &mut |_: &mut Trainer| ControlFlow::Continue(());
+        alone.train_with(&mut flat_above, 10, go_on).unwrap();
+        assert_eq!(flat(&alone.trained()), flat(&taken.trained()));
+        alone.take_warnings()
+    };
+    // Of what it said on the way, at the full λ3 and at the end, only the last look counts: others might have been taken.
+    let of_map: Vec<String> = (said.iter().filter(|w| !constant(w)))
+        .map(ToString::to_string)
+        .collect();
+    let at_end: Vec<String> = alone.iter().map(ToString::to_string).collect();
+    assert!(at_end.ends_with(&of_map), "{of_map:?} {at_end:?}");
+}
+
+/// Answers where the third column never changes.
+struct Flat;
+
+impl Operator for Flat {
+    fn demonstrate(&mut self, target: &[f32]) -> Result<Vec<f32>, operator::Error> {
+        Ok(vec![target[0], target[1], 0.5])
+    }
+}
+
+#[test]
 fn starts_left_anywhere_go_on_bit_for_bit() {
-    let mut whole = starts(5, 1, Answers::ForEach);
+    let mut whole = starts(5, 1);
     let want = flat(&train(&mut whole, 50));
     for stop in [0, 10, 17, 49, 81, 120, 149] {
-        let mut first = starts(5, 2, Answers::ForEach);
+        let mut first = starts(5, 2);
         while first.epoch() < stop {
             match first.advance(1).unwrap() {
                 Advance::NeedsPair(target) => {
@@ -142,7 +257,7 @@ fn starts_left_anywhere_go_on_bit_for_bit() {
             }
         }
         let kept = first.checkpoint().unwrap();
-        let mut second = starts(5, 1, Answers::ForEach);
+        let mut second = starts(5, 1);
         second.resume(&kept).unwrap();
         assert_eq!(second.starts(), first.starts(), "stopped at {stop}");
         assert_eq!(flat(&train(&mut second, 33)), want, "stopped at {stop}");
@@ -152,8 +267,8 @@ fn starts_left_anywhere_go_on_bit_for_bit() {
 
 #[test]
 fn a_checkpoint_of_other_starts_or_a_broken_one_is_refused_and_changes_nothing() {
-    let kept = starts(3, 1, Answers::ForEach).checkpoint().unwrap();
-    let error = starts(2, 1, Answers::ForEach).resume(&kept).unwrap_err();
+    let kept = starts(3, 1).checkpoint().unwrap();
+    let error = starts(2, 1).resume(&kept).unwrap_err();
     assert!(
         matches!(
             error,
@@ -164,14 +279,20 @@ fn a_checkpoint_of_other_starts_or_a_broken_one_is_refused_and_changes_nothing()
         ),
         "{error}"
     );
-    let error = starts(1, 1, Answers::ForEach).resume(&kept).unwrap_err();
+    let error = starts(1, 1).resume(&kept).unwrap_err();
     assert_eq!(
         error.to_string(),
         "the checkpoint is of a training with 3 starts, this one has 1"
     );
-    let error = starts(3, 1, Answers::Once).resume(&kept).unwrap_err();
+    let (q, x) = samples();
+    let in_target = Several {
+        judge: Judge::CostInTarget,
+        ..several(3)
+    };
+    let mut other = Starts::new((&q, &x), &settings(1), in_target).unwrap();
+    let error = other.resume(&kept).unwrap_err();
     assert!(matches!(error, checkpoint::Error::OtherSettings), "{error}");
-    let mut same = starts(3, 1, Answers::ForEach);
+    let mut same = starts(3, 1);
     for cut in [0, 5, 100, kept.len() / 2, kept.len() - 1] {
         assert!(same.resume(&kept[..cut]).is_err());
     }
@@ -180,85 +301,13 @@ fn a_checkpoint_of_other_starts_or_a_broken_one_is_refused_and_changes_nothing()
     bent[middle] ^= 1;
     assert!(same.resume(&bent).is_err());
     same.resume(&kept).unwrap();
-    let one = starts(1, 1, Answers::ForEach).checkpoint().unwrap();
+    let one = starts(1, 1).checkpoint().unwrap();
     assert!(same.resume(&one).is_err());
-}
-
-/// Answers as a person does: counts how often.
-struct Person(usize);
-
-impl Operator for Person {
-    fn demonstrate(&mut self, target: &[f32]) -> Result<Vec<f32>, operator::Error> {
-        self.0 += 1;
-        above().demonstrate(target)
-    }
-}
-
-#[test]
-fn a_person_shows_each_pair_once_and_every_start_has_them_in_an_order_of_its_own() {
-    let run = |threads, each| {
-        let mut all = starts(6, threads, Answers::Once);
-        let mut person = Person(0);
-        let trained = all
-            .train_with(&mut person, each, &mut go_on)
-            .unwrap()
-            .unwrap();
-        assert_eq!(person.0, 3);
-        (all, flat(&trained))
-    };
-    let (all, want) = run(1, 50);
-    assert_eq!(run(2, 7).1, want);
-    let sorted = |pairs: &Pairs| {
-        let mut rows: Vec<Vec<u32>> = (pairs.inputs.iter_rows().zip(pairs.targets.iter_rows()))
-            .map(|(q, x)| q.iter().chain(x).map(|v| v.to_bits()).collect())
-            .collect();
-        rows.sort();
-        rows
-    };
-    let shown = all.runners[0].trainer.pairs();
-    assert!(
-        all.runners
-            .iter()
-            .all(|runner| sorted(runner.trainer.pairs()) == sorted(shown))
-    );
-    assert!(
-        all.runners
-            .iter()
-            .any(|runner| runner.trainer.pairs() != shown)
-    );
-    assert!(all.runners.iter().all(|runner| runner.trainer.epoch() > 30));
-}
-
-#[test]
-fn a_person_s_pairs_are_kept_in_a_checkpoint_of_the_restarts() {
-    let mut whole = starts(4, 1, Answers::Once);
-    let want = whole
-        .train_with(&mut Person(0), 50, &mut go_on)
-        .unwrap()
-        .unwrap();
-    let mut first = starts(4, 1, Answers::Once);
-    let stopped = first.train_with(
-        &mut Person(0),
-        1,
-        &mut |starts| match starts.starts()[1].epochs >= 15 {
-            true => ControlFlow::Break(()),
-            false => ControlFlow::Continue(()),
-        },
-    );
-    assert!(stopped.unwrap().is_none());
-    let mut second = starts(4, 1, Answers::Once);
-    second.resume(&first.checkpoint().unwrap()).unwrap();
-    let mut person = Person(0);
-    let trained = second
-        .train_with(&mut person, 50, &mut go_on)
-        .unwrap()
-        .unwrap();
-    assert_eq!((person.0, flat(&trained)), (0, flat(&want)));
 }
 
 #[test]
 fn the_standing_counts_the_epochs_of_all_starts_and_ends_at_its_total() {
-    let mut seven = starts(7, 2, Answers::ForEach);
+    let mut seven = starts(7, 2);
     let total = seven.standing().total;
     let mut seen = Vec::new();
     seven
@@ -281,14 +330,14 @@ fn the_standing_counts_the_epochs_of_all_starts_and_ends_at_its_total() {
 fn a_training_of_which_every_start_diverges_says_so() {
     let (mut q, x) = samples();
     q.data.iter_mut().for_each(|v| *v *= 1e30);
-    let mut all = Starts::new((&q, &x), &settings(2), several(3, Answers::ForEach)).unwrap();
+    let mut all = Starts::new((&q, &x), &settings(2), several(3)).unwrap();
     let error = all.train_with(&mut above(), 10, &mut go_on).unwrap_err();
     assert!(matches!(error, Error::Diverged { .. }), "{error}");
 }
 
 #[test]
 fn a_start_that_diverges_is_ended_and_the_others_go_on() {
-    let mut three = starts(3, 1, Answers::ForEach);
+    let mut three = starts(3, 1);
     three.runners[1].diverged = Some(Error::Diverged { epoch: 0 });
     train(&mut three, 10);
     let fates = three.starts();
@@ -301,7 +350,7 @@ fn a_start_that_diverges_is_ended_and_the_others_go_on() {
 
 #[test]
 fn as_many_starts_fit_as_the_time_allows_and_one_in_any_case() {
-    let mut one = starts(1, 1, Answers::ForEach);
+    let mut one = starts(1, 1);
     one.advance(9).unwrap();
     assert_eq!(one.count_within(Duration::ZERO), 1);
     assert_eq!(one.count_within(Duration::from_secs(1_000_000)), MOST);
@@ -318,7 +367,7 @@ fn fixed_pairs_are_those_of_every_start() {
         pairs: PairPlan::Fixed(pairs.clone()),
         ..settings(2)
     };
-    let mut all = Starts::new((&q, &x), &settings, several(3, Answers::Once)).unwrap();
+    let mut all = Starts::new((&q, &x), &settings, several(3)).unwrap();
     let trained = all
         .train_with(&mut crate::algorithm::Nobody, 50, &mut go_on)
         .unwrap()

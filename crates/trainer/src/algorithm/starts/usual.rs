@@ -1,6 +1,6 @@
 //! What several starts do where nothing else is said, by measurement (docs/measurements/starts.md).
 
-use super::{Answers, Judge, Several};
+use super::{Judge, Several};
 use crate::algorithm::Plan;
 use crate::network::Initialisation;
 
@@ -38,12 +38,11 @@ impl Usual {
         judge: Judge::CostInTarget,
     };
 
-    /// So many starts, each answered for itself.
+    /// So many starts.
     #[must_use]
     pub const fn several(&self, count: usize) -> Several {
         Several {
             count,
-            answers: Answers::ForEach,
             judge: self.judge,
         }
     }
