@@ -32,10 +32,17 @@ pub fn glove() -> Result<(), Failure> {
     )
 }
 
-/// What a page at 60 pictures a second costs the loop, and an hour of it.
+/// A whole live training in front of a browser; what a page at 60 pictures a second costs the loop, and an hour of it.
 pub fn view() -> Result<(), Failure> {
-    let only = ["--ignored", "--nocapture", "a_page_costs_the_loop"];
-    step::run("the page's cost", step::whole_loop().args(only))
+    let whole = "a_whole_live_training_in_front_of_a_browser";
+    for (name, test) in [
+        ("a live training in a browser", whole),
+        ("the page's cost", "a_page_costs_the_loop"),
+    ] {
+        let only = ["--ignored", "--nocapture", test];
+        step::run(name, step::whole_loop().args(only))?;
+    }
+    Ok(())
 }
 
 /// The ignored tests of one file, one after another.

@@ -1,10 +1,11 @@
-//! A hand and a 3-Finger gripper as a few lines, to be told apart at a glance: schematic. Where the lines are is
+//! A hand and a gripper as a few lines, to be told apart at a glance: schematic. Where the lines are is
 //! [`glove::hand::shape`] and [`gripper::kinematics`].
 //!
 //! Colours say what moves what: thumb and finger A, index and finger B, ring and little finger and finger C.
 
 use glove::hand::{JOINT_COUNT, Side, shape};
 use gripper::kinematics::Model;
+use gripper::registers::two_finger;
 
 use super::{Key, Sketch, Stroke};
 
@@ -34,6 +35,12 @@ const PALM: View = View {
 const FRONT: View = View {
     turn: 0.9,
     rise: 0.35,
+};
+
+/// A gripper of two fingers almost from the front, where they close across.
+const ACROSS_FRONT: View = View {
+    turn: -1.25,
+    rise: 0.2,
 };
 
 /// Millimetres shown: across, and up from here, in the same scale.
@@ -96,9 +103,49 @@ pub fn hand(angles: &[f32]) -> Sketch {
     sketch(parts, PALM)
 }
 
-/// The gripper seen with finger A behind; 4 counts.
+/// The gripper: of 4 counts the 3-Finger, seen with finger A behind; of one count a 2F-85, which stands for all of two fingers.
 #[must_use]
 pub fn gripper(counts: &[f32]) -> Sketch {
+    match counts.len() {
+        1 => two_fingers(counts),
+        _ => three_fingers(counts),
+    }
+}
+
+fn two_fingers(counts: &[f32]) -> Sketch {
+    let model = Model::TwoFinger(two_finger::Model::TwoFinger85);
+    let Some(poses) = model.poses(counts) else {
+        return Sketch::default();
+    };
+    let (wide, high) = (36.0, 52.0);
+    let body = |x: f32, colour: Colour| Part {
+        line: vec![
+            [x, -wide, 0.0],
+            [x, wide, 0.0],
+            [x, wide, high],
+            [x, -wide, high],
+        ],
+        colour,
+        width: 0,
+    };
+    let mut parts = vec![body(14.0, [178, 182, 190]), body(-14.0, METAL)];
+    let end = |k: usize| poses[k].at(model.links()[k].end);
+    // Behind the palm come knuckle and finger, left and right: one count moves both.
+    for (knuckle, colour) in [(1, THUMB_A), (3, RING_C)] {
+        let finger = poses[knuckle + 1].position;
+        parts.push(Part {
+            line: vec![poses[knuckle].position, finger, end(knuckle + 1)],
+            colour,
+            width: 8,
+        });
+    }
+    for point in parts.iter_mut().flat_map(|part| &mut part.line) {
+        *point = point.map(|c| GRIPPER * c);
+    }
+    sketch(parts, ACROSS_FRONT)
+}
+
+fn three_fingers(counts: &[f32]) -> Sketch {
     let model = Model::ThreeFinger;
     let Some(poses) = model.poses(counts) else {
         return Sketch::default();
@@ -251,6 +298,19 @@ mod tests {
     }
 
     #[test]
+    fn two_fingers_come_together_where_one_count_closes_them() {
+        let apart = |count: f32| {
+            let sketch = gripper(&[count]);
+            let of = |colour: Colour| {
+                let mut strokes = sketch.strokes.iter();
+                strokes.find(|s| s.colour == colour).unwrap().points[2].0
+            };
+            (of(THUMB_A) - of(RING_C)).abs()
+        };
+        assert!(apart(0.0) > apart(255.0) + 0.2, "{}", apart(0.0));
+    }
+
+    #[test]
     fn every_posture_stays_on_the_drawing() {
         let within = |sketch: &Sketch| {
             let points = sketch.strokes.iter().flat_map(|stroke| &stroke.points);
@@ -271,6 +331,7 @@ mod tests {
             for scissor in [0.0, 255.0] {
                 assert!(within(&gripper(&[count, 255.0 - count, count, scissor])));
             }
+            assert!(within(&gripper(&[count])), "{count}");
         }
     }
 

@@ -284,6 +284,10 @@ fn a_live_training_that_is_killed_goes_on_with_its_pairs_and_its_map_can_be_repo
             .contains("volume occupancy"),
         "{reported}"
     );
+    // On the poses that did not train, like the end of the training.
+    for same in ["verdict", "good", "quality", "faults"] {
+        assert_eq!(reported[same], result[same]);
+    }
     assert_eq!(reported["pairs"].as_array().unwrap().len(), 3);
     let page = std::fs::read_to_string(bench.file("model.html")).unwrap();
     assert!(

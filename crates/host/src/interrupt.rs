@@ -119,6 +119,26 @@ impl Interrupt {
         self.flags.asked.store(true, Ordering::Relaxed);
     }
 
+    /// From here on the end of the process `parent`, which began this one, asks for the end, too, however that process ends. Elsewhere
+    /// than on Linux nothing happens.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn ends_with(&self, parent: u32) -> std::io::Result<()> {
+        #[cfg(target_os = "linux")]
+        {
+            use rustix::process::{Signal, getppid, set_parent_process_death_signal};
+            set_parent_process_death_signal(Some(Signal::INT))?;
+            // It may have ended before.
+            let now = getppid().map(|id| id.as_raw_nonzero().get());
+            if now != i32::try_from(parent).ok() {
+                self.ask();
+            }
+        }
+        let _ = parent;
+        Ok(())
+    }
+
     /// From here on SIGXFSZ is no request for the end by itself: the caller looks with [`Interrupt::file_limit`].
     pub fn look_after_file_limit(&self) {
         self.flags.file_limit_is_told.store(true, Ordering::Relaxed);

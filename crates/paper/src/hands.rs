@@ -26,7 +26,7 @@ const LOOKED_S: f64 = 20.0;
 /// It cannot be drawn.
 pub fn chosen_pairs(pairs: &Pairs, joints: &[&str]) -> Result<Drawing, charts::Error> {
     let (mut hands, mut grippers) = (Vec::new(), Vec::new());
-    let mut csv = header("pair,like", joints);
+    let mut csv = header("pair,like", joints, pairs.targets.cols);
     let rows = pairs.inputs.iter_rows().zip(pairs.targets.iter_rows());
     for (number, (q, x)) in (1..).zip(rows) {
         let like = like(x);
@@ -116,7 +116,7 @@ impl Motion {
     /// It cannot be drawn.
     pub fn draw(&self, joints: &[&str]) -> Result<Drawing, charts::Error> {
         let (hands, grippers) = (&self.hands, &self.grippers);
-        let mut csv = header("pose,time_s", joints);
+        let mut csv = header("pose,time_s", joints, grippers.cols);
         for (index, (q, x)) in hands.iter_rows().zip(grippers.iter_rows()).enumerate() {
             let time = index as f64 * SNAPSHOT_S;
             let _ = writeln!(csv, "{index},{time},{},{}", joined(q), joined(x));
@@ -191,8 +191,9 @@ pub fn principal_axes(
 }
 
 /// The header of a file of hand poses with gripper poses behind these columns.
-fn header(first: &str, joints: &[&str]) -> String {
-    let axes = Space::ThreeFinger.axis_names().join(",");
+fn header(first: &str, joints: &[&str], axes: usize) -> String {
+    let space = Space::of_axes(axes).unwrap_or(Space::ThreeFinger);
+    let axes = space.axis_names().join(",");
     format!("{first},{},{axes}\n", joints.join(","))
 }
 

@@ -301,6 +301,7 @@ model = \"mine.safetensors\"
         "commands",
         "cost",
         "dim",
+        "ends-with",
         "engage",
         "epochs",
         "epsilon",

@@ -103,7 +103,8 @@ impl TeachView {
         ])
     }
 
-    fn prompt(&self) -> String {
+    /// What to do, in words.
+    pub fn prompt(&self) -> String {
         match &self.doing {
             Doing::Free(ask) => format!(
                 "{} ({} s; {} s of it all)",

@@ -157,6 +157,7 @@ impl Run {
                 })
                 .collect(),
             age_s: shown::gripper_age(snapshot),
+            is_imagined: false,
         }
     }
 }

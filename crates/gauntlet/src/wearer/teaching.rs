@@ -9,7 +9,6 @@ use host::glove::hand::{JOINT_COUNT, SEGMENT_COUNT};
 use host::glove::scan::{self, Scanner};
 use host::glove::{Duration, Instant};
 use host::trainer::algorithm::Schedule;
-use host::trainer::data::Pairs;
 use host::trainer::hand::Space;
 use rig::glove::VirtualGlove;
 use rig::person::{Attitude, Playing, Task};
@@ -28,6 +27,7 @@ use host::training::Course;
 use host::training::judgement::Judgement;
 use host::training::lessons::{Finished, Lessons};
 use host::training::motion::Motion;
+use host::training::pairs_kept::reference_pairs;
 use host::training::quality::Quality;
 
 /// A scan of the bare hand, as often as a glove at full speed gives one.
@@ -314,11 +314,11 @@ impl Lived {
         pairs: &[Taught],
         interrupt: &Interrupt,
     ) -> Result<(Finished, Judgement)> {
-        let pairs: Pairs = matrices(pairs);
-        let finished = lessons.finish_quietly(pairs.clone(), interrupt)?;
+        let finished = lessons.finish_quietly(matrices(pairs), interrupt)?;
         let quality = Quality::from_measured(&finished.measured, self.space);
         let map = (&finished.model, self.space);
-        let judgement = Judgement::of(map, &motion.frames(), Some(&pairs), quality);
+        let pairs = reference_pairs(&finished.model);
+        let judgement = Judgement::of(map, &motion.frames(), pairs.as_ref(), quality);
         Ok((finished, judgement))
     }
 }

@@ -65,7 +65,8 @@ pub struct ViewOptions {
 }
 
 impl ViewOptions {
-    fn wanted(&self) -> bool {
+    /// Whether there is to be a page.
+    pub fn is_wanted(&self) -> bool {
         self.view || self.open || self.view_address.is_some()
     }
 }
@@ -84,7 +85,7 @@ impl Page {
     /// # Errors
     /// A failure that names the address: it is taken, or not one of this computer.
     pub fn start(options: &ViewOptions, tell: &Tell) -> Result<Option<Self>> {
-        if !options.wanted() {
+        if !options.is_wanted() {
             return Ok(None);
         }
         let usual = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));

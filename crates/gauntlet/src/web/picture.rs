@@ -119,6 +119,8 @@ pub struct Gripper {
     pub axes: Vec<Axis>,
     /// Age of the positions in seconds, where they are old.
     pub age_s: Option<f32>,
+    /// Whether this is what a map makes of the hand, and no gripper that is there.
+    pub is_imagined: bool,
 }
 
 /// One axis of the gripper, counts.
@@ -152,7 +154,7 @@ pub struct Rates {
 /// Teaching the map: what is asked for.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct Teach {
-    /// Which round it is, from 1.
+    /// Which pose it is, from 1; the start poses count.
     pub round: usize,
     /// Of how many.
     pub rounds: usize,
@@ -166,6 +168,8 @@ pub struct Teach {
     pub held: f32,
     /// What is counted down: 3, 2, 1.
     pub countdown: Option<u8>,
+    /// What was said last, where it is no refusal.
+    pub said: Option<String>,
     /// Why the newest pose was refused, in words.
     pub refused: Option<String>,
 }
@@ -203,7 +207,8 @@ pub struct Guide {
 pub struct Action {
     /// How the page names it to the program.
     pub name: &'static str,
-    /// The key that does it, a letter as [`KeyboardEvent.key`](https://developer.mozilla.org/docs/Web/API/KeyboardEvent/key) has it.
+    /// The key that does it, a letter as [`KeyboardEvent.key`](https://developer.mozilla.org/docs/Web/API/KeyboardEvent/key) has it;
+    /// `any`: every key that nothing else is done by.
     pub key: &'static str,
     /// What the button says.
     pub words: String,

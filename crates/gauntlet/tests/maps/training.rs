@@ -143,13 +143,52 @@ fn table_3_s_poses_are_named_and_a_file_of_pairs_is_taken() {
 }
 
 #[test]
-fn a_hand_s_own_training_file_is_not_held_out() {
+fn train_eval_and_report_say_the_same_of_the_motion_that_trained() {
+    let folder = tempfile::tempdir().unwrap();
+    let poses = poses_file(folder.path(), 700);
+    let out = folder.path().join("m.safetensors");
+    let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
+    for more in [&["--seed", "9", "--hold-out", "0.5"][..], &[]] {
+        let words = [
+            "train", "--poses", poses, "--out", out, "--starts", "1", "--epochs", "5", "--pairs",
+            "1", "--json",
+        ];
+        let trained = json(&run(&[&words, more].concat()));
+        assert!(trained["verdict"].is_string(), "{trained}");
+        for verb in ["eval", "report"] {
+            let said = run(&[verb, "--model", out, "--poses", poses, "--json"]);
+            let judged = json(&said);
+            for same in ["verdict", "good", "quality", "faults"] {
+                assert_eq!(judged[same], trained[same], "{verb}: {same}");
+            }
+            let warned = support::text(&said.stderr);
+            assert!(!warned.contains("not held out"), "{warned}");
+        }
+    }
+    let output = run(&["eval", "--model", out, "--poses", poses, "--json"]);
+    assert_eq!(json(&output)["held_out"], true);
+}
+
+#[test]
+fn a_hand_s_own_training_file_is_not_held_out_where_all_of_it_trained() {
     let folder = tempfile::tempdir().unwrap();
     let poses = poses_file(folder.path(), 60);
     let out = folder.path().join("m.safetensors");
     let (poses, out) = (poses.to_str().unwrap(), out.to_str().unwrap());
     let words = [
-        "train", "--poses", poses, "--out", out, "--starts", "1", "--epochs", "5", "--pairs", "1",
+        "train",
+        "--poses",
+        poses,
+        "--out",
+        out,
+        "--starts",
+        "1",
+        "--epochs",
+        "5",
+        "--pairs",
+        "1",
+        "--hold-out",
+        "0",
     ];
     assert_eq!(run(&words).status.code(), Some(0));
     let output = run(&["eval", "--model", out, "--poses", poses, "--json"]);

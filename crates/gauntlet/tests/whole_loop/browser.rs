@@ -56,6 +56,7 @@ pub fn picture(bent: f32) -> Picture {
                 })
                 .collect(),
             age_s: None,
+            is_imagined: false,
         }),
         rates: Some(Rates {
             frames_per_s: 31.4,
@@ -336,6 +337,7 @@ fn states() -> BTreeMap<&'static str, Picture> {
         words: "hold still".to_owned(),
         held: 0.62,
         countdown: Some(2),
+        said: Some("pose 2 taken".to_owned()),
         refused: None,
     };
     let guide = Guide {

@@ -1,4 +1,4 @@
-//! How a watch of a bridge on a chip is judged at its end. Skipped, with a word, where QEMU or the firmware is missing.
+//! A bridge on a chip that is watched: how that is judged at its end, and what its page shows. Skipped, with a word, where QEMU or the firmware is missing.
 
 use crate::debugger;
 use crate::support;
@@ -12,7 +12,8 @@ use std::time::{Duration, Instant};
 use host::chip::emulator::{Emulator, Setup, find_firmware, qemu_is_there};
 use rig::glove::VirtualGlove;
 use rig::gripper::{Config, VirtualGripper};
-use support::bench::{hand, jam, jumps};
+use support::bench::{Running, ends_soon, hand, jam, jumps};
+use support::page::{OpenPage, address};
 use support::{command, devices, model, refusal, run, text, until_line, wait};
 
 /// What a test can break.
@@ -34,8 +35,16 @@ impl World {
     }
 }
 
-/// `bridge engage` for some `seconds` on a bridge in QEMU; `breaks` is done once it says that the gripper follows the hand.
-fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<Output> {
+/// A bridge in QEMU between a glove whose hand moves once that is set, and an active gripper.
+struct Chip {
+    emulator: Emulator,
+    glove: VirtualGlove,
+    gripper: VirtualGripper,
+    moves: Arc<AtomicBool>,
+    _ports: [rig::pty::Handle; 2],
+}
+
+fn chip() -> Option<Chip> {
     let firmware = find_firmware(None).ok().filter(|_| qemu_is_there());
     let Some(firmware) = firmware else {
         rig::skip::skipped(
@@ -50,9 +59,6 @@ fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<O
     let (glove_port, _) = devices::behind_pty(glove.clone());
     let (gripper, gripper_port, _) = devices::gripper(Config::default());
     gripper.preset_active();
-    if jammed {
-        jam(&gripper);
-    }
     let mut emulator = Emulator::new(Setup {
         firmware,
         glove: Some(glove_port.path().to_owned()),
@@ -61,6 +67,64 @@ fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<O
     })
     .unwrap();
     drop(emulator.link().unwrap());
+    Some(Chip {
+        emulator,
+        glove,
+        gripper,
+        moves,
+        _ports: [glove_port, gripper_port],
+    })
+}
+
+#[test]
+fn the_page_of_a_watched_chip_shows_what_it_does_and_closes_nothing() {
+    let Some(chip) = chip() else {
+        return;
+    };
+    let bridge = chip.emulator.address().to_string();
+    let words = ["bridge", "monitor", "--bridge", &bridge, "--view", "--json"];
+    let mut running = Running::start(
+        command(&[&words[..], &["--seconds", "60"]].concat())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped()),
+    );
+    let mut page = OpenPage::open(&address(running.0.stderr.take().unwrap()));
+    let truth = chip.gripper.positions();
+    let reached =
+        |page: &OpenPage, axis: usize| page.picture["gripper"]["axes"][axis]["reached"].as_f64();
+    page.until("the gripper", |page| {
+        (0..4).all(|axis| reached(page, axis) == Some(f64::from(truth[axis].round())))
+    });
+    page.until("the sensors", |page| {
+        let sensors = page.picture["hand"]["sensors"].as_array();
+        sensors.is_some_and(|all| all.len() == 16 && all.iter().all(|s| s["health"] == "good"))
+    });
+    let title = page.picture["title"].as_str().unwrap();
+    assert!(title.contains("bridge monitor"), "{title}");
+    assert_eq!(page.picture["clutch"]["may_close"], false);
+    page.say("close");
+    let number = page.number;
+    page.until("some pictures later", |page| page.number > number + 20);
+    assert_eq!(page.clutch(), "open");
+    assert_eq!(chip.gripper.writes(), 0, "something was commanded");
+    support::interrupt(&running.0);
+    let why = page.until_closed();
+    assert_eq!(why.as_deref(), Some("the program has ended"));
+    ends_soon(&mut running.0);
+}
+
+/// `bridge engage` for some `seconds` on a bridge in QEMU; `breaks` is done once it says that the gripper follows the hand.
+fn engaged(jammed: bool, seconds: &str, breaks: impl FnOnce(&World)) -> Option<Output> {
+    let Chip {
+        emulator,
+        glove,
+        gripper,
+        moves,
+        _ports,
+    } = chip()?;
+    if jammed {
+        jam(&gripper);
+    }
     let bridge = emulator.address().to_string();
     let flashed = run(&["flash", model().to_str().unwrap(), "--bridge", &bridge]);
     assert_eq!(flashed.status.code(), Some(0), "{}", text(&flashed.stderr));

@@ -17,4 +17,5 @@ mod every_gripper;
 mod own_faults;
 mod page;
 mod stalls;
+mod taught;
 mod view;

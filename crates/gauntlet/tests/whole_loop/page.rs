@@ -113,6 +113,47 @@ fn a_page_that_was_slow_gets_the_newest_picture_and_none_of_those_between() {
     assert!(slow.pictures <= 4, "{} pictures", slow.pictures);
 }
 
+/// The short form of the hour's soak (`cargo xtask campaign view`).
+#[test]
+fn a_page_that_asks_for_every_picture_and_reads_none_costs_no_memory_and_another_sees_the_newest() {
+    const PICTURES: usize = 300;
+    const LONG: usize = 400_000;
+    let mut page = served();
+    let mut reader = OpenPage::open(page.address());
+    let mut greedy = OpenPage::open(page.address());
+    let mut early = 0;
+    for number in 1..=PICTURES {
+        while !page.is_due() {
+            reader.look().unwrap();
+        }
+        page.show(|| titled(format!("{number} {}", "x".repeat(LONG))));
+        greedy.say("ready");
+        if number == PICTURES / 5 {
+            early = resident_kb(std::process::id());
+        }
+    }
+    let late = resident_kb(std::process::id());
+    let shown = u64::try_from(PICTURES * LONG / 1_000).unwrap();
+    assert!(
+        early > 0 && late < early + shown / 3,
+        "{early} kB, then {late} kB"
+    );
+    let newest = format!("{PICTURES} ");
+    reader.until("the newest", |page| {
+        page.picture["title"]
+            .as_str()
+            .is_some_and(|title| title.starts_with(&newest))
+    });
+}
+
+/// What a process takes of memory, kB; 0 where it has ended.
+fn resident_kb(process: u32) -> u64 {
+    let status = std::fs::read_to_string(format!("/proc/{process}/status")).unwrap_or_default();
+    let line = status.lines().find(|line| line.starts_with("VmRSS:"));
+    let number = line.and_then(|line| line.split_whitespace().nth(1));
+    number.and_then(|kb| kb.parse().ok()).unwrap_or(0)
+}
+
 #[test]
 fn a_page_that_says_too_much_or_what_means_nothing_is_told_to_go_and_the_program_hears_that_it_went()
  {
@@ -314,11 +355,10 @@ fn driven(seconds: u32, watched: bool) -> (f64, u64, u64) {
     if watched {
         let mut page = OpenPage::open(&address(running.0.stderr.take().unwrap()));
         while page.look().is_ok() {
-            let status = std::fs::read_to_string(format!("/proc/{}/status", running.0.id()));
-            let status = status.unwrap_or_default();
-            let resident = status.lines().find(|line| line.starts_with("VmRSS:"));
-            let number = resident.and_then(|line| line.split_whitespace().nth(1));
-            memory = number.and_then(|kb| kb.parse().ok()).unwrap_or(memory);
+            memory = match resident_kb(running.0.id()) {
+                0 => memory,
+                kb => kb,
+            };
         }
         pictures = page.pictures;
     }

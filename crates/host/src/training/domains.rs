@@ -205,6 +205,7 @@ pub fn task(request: &Request<'_>) -> Result<Task> {
         truth: truth.map(|truth| matching(&truth, &held_out)),
         training,
         held_out,
+        hold_out: request.hold_out,
         usual: Usual::of_target(target.values.cols),
         measuring: target.values.clone(),
         targets: target.values,

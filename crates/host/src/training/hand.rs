@@ -7,16 +7,15 @@ use anyhow::Result;
 use glove::hand::{JOINT_NAMES, LIMITS};
 use trainer::algorithm::starts::{Start, Usual};
 use trainer::algorithm::{PairPlan, Schedule};
-use trainer::data::{Columns, Matrix, Pairs, Table, split};
+use trainer::data::{Columns, Matrix, Pairs, Table};
 use trainer::hand::table3;
 use trainer::hand::{Draw, Scripted, Space, start_pairs};
-use trainer::measures::NEIGHBOURS;
 use trainer::model::{Model, Normalisation};
 use trainer::operator::Operator;
-use trainer::spread::spread;
 
 use super::domains::first;
 use super::learn::learn;
+use super::measuring::{Parts, SEED};
 use super::pairs::{PairChoice, PairKind};
 use super::task::{Course, Ended, TRAINING_SHARE, Task, Units};
 use crate::failure::{Failure, told};
@@ -27,8 +26,6 @@ use crate::training::quality::{Quality, TARGETS};
 
 /// Pairs where nothing else is said (§3.3.4).
 const PAIRS: usize = 8;
-/// Frames to train and measure on: more of them are neighbours of these (the paper's recording has 635).
-pub const MOST_FRAMES: usize = 1000;
 
 /// A training with adaptive pairs, as the demo does it.
 #[derive(Debug)]
@@ -157,42 +154,30 @@ pub fn task(
     hold_out: f64,
 ) -> Result<Task> {
     let inputs = motion.frames();
-    let frames = inputs.select(&spread(&inputs, MOST_FRAMES));
-    if frames.rows < inputs.rows {
+    let parts = Parts::of(&inputs, hold_out, seed);
+    if parts.taken < inputs.rows {
         wanted.reporter.note(&format!(
             "note: of {} frames the {} that are farthest from one another are taken: the others are near to them",
-            inputs.rows,
-            frames.rows
+            inputs.rows, parts.taken
         ));
     }
-    let parts = split(frames.rows, 1.0 - hold_out, seed);
-    let training = frames.select(&parts.train);
-    let enough = parts.test.len() > NEIGHBOURS;
-    let held_out = if enough {
-        frames.select(&parts.test)
-    } else {
-        training.clone()
-    };
     let source = match motion {
         Motion::Generated { .. } => "generated motion".to_owned(),
         Motion::Recorded { name, .. } => name.clone(),
     };
-    let share = if enough {
-        "held-out frames"
-    } else {
-        "the training frames"
-    };
-    let mut operator = operator((motion, space), &training)?;
+    let measured_on = format!("{} of {source}", parts.words());
+    let mut operator = operator((motion, space), &parts.training)?;
     let (pairs, pairs_from) = pairs(wanted, space, &mut operator)?;
     let units = Units {
         q: Normalisation::identity(inputs.cols),
         x: space.units(),
     };
     Ok(Task {
-        training,
-        held_out,
+        training: parts.training,
+        held_out: parts.measuring,
+        hold_out,
         targets: space.samples(TARGETS, seed, Draw::Train),
-        measuring: space.samples(TARGETS, seed, Draw::Measure),
+        measuring: space.samples(TARGETS, SEED, Draw::Measure),
         truth: None,
         coverage: space.coverage(),
         hand: Some(space),
@@ -205,7 +190,7 @@ pub fn task(
         usual: Usual::HAND,
         names: &JOINT_NAMES,
         pairs_from,
-        measured_on: format!("{share} of {source}"),
+        measured_on,
     })
 }
 

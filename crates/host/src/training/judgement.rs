@@ -13,11 +13,12 @@ use std::fmt;
 use glove::hand::JOINT_COUNT;
 use serde::Serialize;
 use trainer::data::{Matrix, Pairs};
-use trainer::hand::Space;
+use trainer::hand::{Draw, Space};
 use trainer::model::Model;
 
+use super::measuring::Measuring;
 use super::movements::{Movement, Movements};
-use super::quality::{LEAST_MEASURED, Quality};
+use super::quality::{LEAST_MEASURED, Quality, TARGETS};
 use super::recorded::names;
 use crate::words::axis_words;
 use influence::{Influence, Turned};
@@ -180,6 +181,26 @@ impl Judgement {
             pairs,
             faults,
         }
+    }
+
+    /// Judges a map on a hand's motion: measured on what [`Measuring`] takes of it, and looked at over all of it. Whether what is measured
+    /// on was held out of the training; `None` where the model does not say. `named`: where the poses are from; `seed`: of the gripper
+    /// poses that stand for all.
+    pub fn on(
+        (model, space): (&Model, Space),
+        (frames, named): (&Matrix, &str),
+        pairs: Option<&Pairs>,
+        seed: u64,
+    ) -> (Self, Option<bool>) {
+        let measuring = Measuring::of(model, frames);
+        let quality = Quality::of(
+            (model, space),
+            &measuring.frames,
+            &space.samples(TARGETS, seed, Draw::Measure),
+            format!("{} of {named}", measuring.words),
+        );
+        let judgement = Self::of((model, space), frames, pairs, quality);
+        (judgement, measuring.held_out)
     }
 
     /// Whether the map is worth driving with.

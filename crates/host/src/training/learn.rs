@@ -49,6 +49,7 @@ pub fn learn(
         progress: reporter.begin("training", total as u64),
         warnings: Vec::new(),
         names: task.names,
+        curve: Vec::new(),
     };
     let mut pause = Pause::Interrupt;
     let started = Instant::now();
@@ -90,6 +91,7 @@ pub fn learn(
             took: started.elapsed(),
             warnings: told_so_far.warnings,
             starts: starts.starts(),
+            curve: told_so_far.curve,
         })));
     }
     if let Some(path) = &course.checkpoint {
@@ -111,6 +113,7 @@ pub(super) fn warnings(task: &Task, course: &Course) -> Result<Vec<Warning>> {
         progress: Nobody.begin("looking at the data", 0),
         warnings: Vec::new(),
         names: task.names,
+        curve: Vec::new(),
     };
     for warning in starts.take_warnings() {
         said.tell(&warning, &starts.standing().first);

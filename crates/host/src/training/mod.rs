@@ -1,10 +1,12 @@
 //! Training a map as the tool does it: data, operator, progress, stopping and going on, measures, model.
 
+pub mod curve;
 pub mod domains;
 pub mod hand;
 pub mod judgement;
 mod learn;
 pub mod lessons;
+pub mod measuring;
 pub mod model;
 pub mod motion;
 pub mod movements;

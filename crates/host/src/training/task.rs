@@ -18,6 +18,7 @@ use trainer::operator::Operator;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::next::Warning;
+use crate::training::curve::Moment;
 use crate::training::pairs_kept;
 use crate::training::quality::Measured;
 
@@ -32,6 +33,8 @@ pub struct Task {
     pub(super) training: Matrix,
     /// Those that measure.
     pub(super) held_out: Matrix,
+    /// Share of the inputs that measure.
+    pub(super) hold_out: f64,
     /// Target samples to train on.
     pub(super) targets: Matrix,
     /// Target samples to measure with.
@@ -214,6 +217,8 @@ pub struct Learned {
     pub warnings: Vec<Warning>,
     /// All starts; the one in the running is taken.
     pub starts: Vec<Start>,
+    /// How the cost fell, in this run of the program.
+    pub curve: Vec<Moment>,
 }
 
 impl Task {
@@ -334,6 +339,7 @@ impl Task {
             ("seed", settings.seed.to_string()),
             ("epochs", learned.trained.epochs.to_string()),
             ("starts", learned.starts.len().to_string()),
+            ("hold_out", self.hold_out.to_string()),
             ("data_sha256", sha256(&[&self.inputs, &self.targets])),
             ("input_sha256", sha256(&[&self.inputs])),
             ("training_sha256", sha256(&[&sorted(&self.training)])),

@@ -3,6 +3,7 @@
 use trainer::algorithm::starts::Standing;
 use trainer::algorithm::{Progress as Step, Warning as OfTraining};
 
+use super::curve::Moment;
 use crate::next::Warning;
 use crate::report::Progress;
 
@@ -12,6 +13,8 @@ pub(super) struct Told {
     pub warnings: Vec<Warning>,
     /// Of the input's columns.
     pub names: &'static [&'static str],
+    /// How the cost fell.
+    pub curve: Vec<Moment>,
 }
 
 impl Told {
@@ -23,6 +26,11 @@ impl Told {
 
     pub fn show(&mut self, standing: &Standing<'_>) {
         let step = &standing.first;
+        self.curve.push(Moment {
+            epoch: step.epoch,
+            pairs: step.pairs.inputs.rows,
+            cost: step.cost,
+        });
         let is_spreading = step.weights.attraction > 0.0;
         self.progress
             .at(standing.epochs as u64, Some(standing.remaining), &|| {

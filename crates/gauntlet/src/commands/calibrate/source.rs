@@ -6,6 +6,7 @@ use std::time::Duration;
 use anyhow::Result;
 use host::glove::hand::{SEGMENT_COUNT, SEGMENT_NAMES};
 use host::glove::imu::UniqueId;
+use host::glove::scan::Health;
 
 use crate::commands::glove::GloveAt;
 use crate::line_log::LineLog;
@@ -188,6 +189,35 @@ impl Source {
                     seen.rate,
                     seen.lost
                 )
+            }
+        }
+    }
+
+    /// How each sensor is; `None` where nobody tells.
+    pub fn health(&self) -> [Option<Health>; SEGMENT_COUNT] {
+        match self {
+            Self::Port { scanning, .. } => match scanning.snapshot() {
+                Some(seen) => seen.health().map(Some),
+                None => [None; SEGMENT_COUNT],
+            },
+            // A bridge says which are good, and of the others nothing.
+            Self::Chip { scans, .. } => {
+                let good = scans.counted().good;
+                std::array::from_fn(|k| (good >> k & 1 == 1).then_some(Health::Good))
+            }
+        }
+    }
+
+    /// Scans in the last second, and those that were lost.
+    pub fn rates(&self) -> (f64, u64) {
+        match self {
+            Self::Port { scanning, .. } => {
+                let seen = scanning.snapshot();
+                seen.map_or((0.0, 0), |seen| (seen.rate, seen.not_taken))
+            }
+            Self::Chip { scans, .. } => {
+                let counted = scans.counted();
+                (counted.rate, counted.lost)
             }
         }
     }

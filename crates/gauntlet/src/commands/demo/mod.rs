@@ -23,7 +23,7 @@ use host::interrupt::Interrupt;
 use host::settings::Settings;
 use host::stats::seconds;
 use host::training::Outcome;
-use host::training::hand::MOST_FRAMES;
+use host::training::measuring::MOST_FRAMES;
 use host::training::motion::Motion;
 use parts::{Stage, Started};
 

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{ArgGroup, Args};
 
 use crate::commands::train::CoverageArgs;
+use host::training::measuring;
 
 /// Options of `eval`.
 #[derive(Debug, Args)]
@@ -25,7 +26,7 @@ pub struct Eval {
     /// The trained model.
     #[arg(long, value_name = "MODEL.safetensors")]
     pub model: PathBuf,
-    /// The hand poses to measure on; best ones the model was not trained on.
+    /// The hand poses to measure on: of those that the model was trained on the part that was held out.
     #[arg(long, value_name = "FILE.csv", conflicts_with_all = ["target", "truth", "epsilon", "volume", "dim"])]
     pub poses: Option<PathBuf>,
     /// Samples of the input domain to measure on, columns q0, q1, …; best ones the model was not trained on.
@@ -41,7 +42,7 @@ pub struct Eval {
     #[command(flatten)]
     pub coverage: CoverageArgs,
     /// Seed of the gripper poses that a hand's map is compared with.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = measuring::SEED)]
     pub seed: u64,
     /// Print the result as JSON.
     #[arg(long)]

@@ -6,8 +6,8 @@ mod show;
 use std::path::Path;
 
 use anyhow::Result;
-use host::trainer::data::{Matrix, require_rows};
-use host::trainer::hand::{Draw, Space};
+use host::trainer::data::require_rows;
+use host::trainer::hand::Space;
 use host::trainer::measures::NEIGHBOURS;
 use host::trainer::model::Model;
 
@@ -20,7 +20,7 @@ use host::failure::{Failure, told};
 use host::training::judgement::Judgement;
 use host::training::motion::Motion;
 use host::training::pairs_kept::reference_pairs;
-use host::training::quality::{Measured, Quality, TARGETS};
+use host::training::quality::Measured;
 use host::training::{domains, model};
 
 /// Measures.
@@ -42,17 +42,17 @@ pub(crate) fn run(options: &Eval) -> Result<()> {
 fn of_hand(options: &Eval, poses: &Path) -> Result<()> {
     let model = model::load(&options.model, &Person)?;
     let frames = Motion::open_for_measuring(poses, &Person)?.frames();
-    let held_out = held_out(&model, &frames, poses);
     let [_, _, axes] = model.shape();
     let space = Space::of_axes(axes).unwrap_or(Space::ThreeFinger);
-    let quality = Quality::of(
-        (&model, space),
-        &frames,
-        &space.samples(TARGETS, options.seed, Draw::Measure),
-        format!("frames of {}", poses.display()),
-    );
     let pairs = reference_pairs(&model);
-    let judgement = Judgement::of((&model, space), &frames, pairs.as_ref(), quality);
+    let named = poses.display().to_string();
+    let (judgement, held_out) = Judgement::on(
+        (&model, space),
+        (&frames, &named),
+        pairs.as_ref(),
+        options.seed,
+    );
+    warn_of(held_out, poses);
     if options.json {
         let quality = maps::Measures::Hand(&judgement.quality);
         return print(options, &model, held_out, quality, Some(&judgement));
@@ -72,7 +72,8 @@ fn of_domains(options: &Eval, input: &Path, target: &Path) -> Result<()> {
     let truth = (options.truth.as_deref())
         .map(|file| domains::true_pairs(file, (&inputs, targets.cols), &Person))
         .transpose()?;
-    let held_out = held_out(&model, &inputs, input);
+    let held_out = model::held_out(&model, &inputs);
+    warn_of(held_out, input);
     let measured = Measured::of(
         &model,
         (&inputs, &targets),
@@ -93,9 +94,8 @@ fn of_domains(options: &Eval, input: &Path, target: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Whether the samples of `file` did not train the model; `None` when the model does not say. Warns where they did.
-fn held_out(model: &Model, samples: &Matrix, file: &Path) -> Option<bool> {
-    let held_out = model::held_out(model, samples);
+/// What is measured on trained the model.
+fn warn_of(held_out: Option<bool>, file: &Path) {
     if held_out == Some(false) {
         note!(
             "warning: {} trained this very model: its measures are not held out and look better than they are; \
@@ -103,7 +103,6 @@ fn held_out(model: &Model, samples: &Matrix, file: &Path) -> Option<bool> {
             file.display()
         );
     }
-    held_out
 }
 
 fn print(

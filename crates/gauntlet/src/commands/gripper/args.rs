@@ -195,6 +195,9 @@ pub struct Move {
     /// Force, 0 least to 255 most.
     #[arg(long, value_name = "N", default_value_t = 64)]
     pub force: u8,
+    /// For the program with this process id, which began this one: where it ends, however it does, this holds the gripper and ends.
+    #[arg(long, value_name = "PID")]
+    pub ends_with: Option<u32>,
 }
 
 impl Move {

@@ -142,6 +142,7 @@ fn moved<F: FnMut(u64, u8) -> u8>(
         to: vec![to],
         speed: 64,
         force: 64,
+        ends_with: None,
     };
     let mut driver = Scripted::new(30.0, shown);
     let first = driver.poll(Instant::from_ticks(CYCLE));
@@ -262,6 +263,7 @@ fn a_next_step_is_the_whole_command() {
         to: vec![9],
         speed: 1,
         force: 2,
+        ends_with: None,
     };
     let whole = "gauntlet gripper move --to 9 --speed 1 --force 2 --gripper /dev/gripper --gripper-model 2f85";
     assert_eq!(options.again().to_string(), whole);

@@ -21,7 +21,7 @@ use host::gripper::driver::{ThreeFinger, TwoFinger};
 use host::gripper::{Activation, Fault, Status};
 
 use crate::tell::Tell;
-use host::failure::Failure;
+use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::lines::Line;
 
@@ -35,6 +35,14 @@ pub use host::lines::Model;
 /// # Errors
 /// A failure that says why it did not happen and what to do.
 pub(crate) fn run(options: &Gripper, interrupt: &Interrupt) -> Result<()> {
+    if let Verb::Move(options) = &options.verb
+        && let Some(id) = options.ends_with
+    {
+        interrupt.ends_with(id).or_fail(
+            || "the end of the program that began this move cannot be seen".to_owned(),
+            "the same move without --ends-with",
+        )?;
+    }
     let target = options.verb.target();
     let is_tcp = host::lines::tcp::Address::parse(&target.gripper)?.is_some();
     if is_tcp && target.model != Model::ThreeFinger {

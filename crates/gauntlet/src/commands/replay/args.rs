@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, ValueEnum};
 
 use crate::options::SafeAction;
+use crate::web::ViewOptions;
 use host::session::Driving;
 
 /// What the commands of a log drive.
@@ -20,6 +21,7 @@ pub enum Target {
 Examples:
   gauntlet replay session.mcap
   gauntlet replay session.mcap --speed 1
+  gauntlet replay session.mcap --view
   gauntlet replay session.mcap --model other.safetensors
   gauntlet replay session.mcap --to virtual --json
 
@@ -54,6 +56,9 @@ pub struct Replay {
     /// Drive a gripper with the log's commands.
     #[arg(long, value_enum, value_name = "GRIPPER", conflicts_with_all = ["model", "profile", "gripper_speed", "force", "rate", "safe_action"])]
     pub to: Option<Target>,
+    /// The page; it shows the log at its own pace where no --speed is said.
+    #[command(flatten)]
+    pub view: ViewOptions,
     /// Print the result as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
@@ -69,6 +74,11 @@ impl Replay {
             safe_action: self.safe_action,
         };
         others.given()
+    }
+
+    /// How many times as fast as it was the log is shown; `None` where it is not.
+    pub fn pace(&self) -> Option<f64> {
+        self.speed.or_else(|| self.view.is_wanted().then_some(1.0))
     }
 
     /// Whether something is to be other than in the log.

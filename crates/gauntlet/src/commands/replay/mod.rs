@@ -12,6 +12,7 @@ use host::bridge::{App, Board};
 use crate::progress::{Person, Progress};
 use crate::results::{self, replays};
 use crate::tell::Tell;
+use crate::web::Page;
 use host::calibration::profile_file::Kept;
 use host::failure::Failure;
 use host::interrupt::Interrupt;
@@ -38,8 +39,16 @@ pub(crate) fn run(options: &Replay, interrupt: &Interrupt) -> Result<()> {
     }
     let changes = changes(options, &traced)?;
     let started = Instant::now();
-    let same = match options.speed {
-        Some(speed) => watched::run(traced.clone(), speed, options.json, interrupt)?,
+    let page = Page::start(&options.view, &tell)?;
+    let same = match options.pace() {
+        Some(speed) => {
+            let shown = watched::Shown {
+                speed,
+                quiet: options.json,
+                page,
+            };
+            watched::run(traced.clone(), shown, interrupt)?
+        }
         None => {
             let mut bar = Bar {
                 shown: Progress::start("replay", traced.end, options.json),

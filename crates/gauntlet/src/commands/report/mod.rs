@@ -22,11 +22,13 @@ use host::failure::{Failure, OrFail, told};
 use host::glove::hand::JOINT_NAMES;
 use host::next::{Command, NextStep};
 use host::teaching::kept::Kept;
+use host::training::curve;
 use host::training::judgement::Judgement;
+use host::training::measuring::SEED;
 use host::training::model;
 use host::training::motion::Motion;
 use host::training::pairs_kept::reference_pairs;
-use host::training::quality::{Quality, TARGETS};
+use host::training::quality::TARGETS;
 use shown::Shown;
 
 /// Options of `report`.
@@ -78,14 +80,10 @@ pub(crate) fn run(options: &Report) -> Result<()> {
     let motion = Motion::open_for_measuring(&poses, &Person)?;
     let frames = motion.frames();
     let pairs = pairs(options, &model, space)?;
-    let targets = space.samples(TARGETS, 1, Draw::Measure);
-    let quality = Quality::of(
-        (&model, space),
-        &frames,
-        &targets,
-        format!("frames of {}", poses.display()),
-    );
-    let judgement = Judgement::of((&model, space), &frames, pairs.as_ref(), quality);
+    let named = poses.display().to_string();
+    let (judgement, held_out) =
+        Judgement::on((&model, space), (&frames, &named), pairs.as_ref(), SEED);
+    let targets = space.samples(TARGETS, SEED, Draw::Measure);
     let shown = Shown {
         file: &options.model,
         poses: &poses,
@@ -95,8 +93,9 @@ pub(crate) fn run(options: &Report) -> Result<()> {
         frames: &frames,
         targets: &targets,
         pairs: pairs.as_ref(),
-        held_out: model::held_out(&model, &frames),
+        held_out,
         judgement: &judgement,
+        curve: &curve::read(&options.model),
     };
     let text = page::page(&shown).or_fail(
         || format!("the page {}", out.display()),

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use super::pictures;
 use super::sections::{escaped, influence, measures, pairs, reach, verdict};
 use super::shown::Shown;
+use host::trainer::hand::Space;
 
 /// What a browser may fetch: nothing.
 const POLICY: &str = "default-src 'none'; style-src 'unsafe-inline'; img-src data:";
@@ -52,7 +53,7 @@ pub(super) fn page(shown: &Shown<'_>) -> Result<String, charts::Error> {
     section(&mut body, "How far the gripper is reached", &reach(shown));
     figure(
         &mut body,
-        Some(pictures::histograms(shown)?),
+        pictures::histograms(shown)?,
         "Where each axis is, over all your poses, and over everything the gripper can do.",
     );
     section(
@@ -60,17 +61,26 @@ pub(super) fn page(shown: &Shown<'_>) -> Result<String, charts::Error> {
         "The reference pairs, the worst first",
         &pairs(shown),
     );
-    figure(
-        &mut body,
-        pictures::pairs(shown)?,
-        "Each pair as it was shown: the hand above, the gripper below.",
-    );
+    if let Some(svg) = pictures::pairs(shown)? {
+        figure(
+            &mut body,
+            svg,
+            "Each pair as it was shown: the hand above, the gripper below.",
+        );
+    }
     section(&mut body, "Folds and twists", "");
-    figure(
-        &mut body,
-        pictures::dissimilar(shown)?,
-        "What your poses become, coloured by d-Knn: red where the map brings hands together that are far apart.",
-    );
+    match shown.space {
+        Space::ThreeFinger => figure(
+            &mut body,
+            pictures::dissimilar(shown)?,
+            "What your poses become, coloured by d-Knn: red where the map brings hands together that are far apart.",
+        ),
+        Space::OneAxis => figure(
+            &mut body,
+            pictures::closing(shown)?,
+            "Where the gripper's fingers are as yours bend. A map that folds comes back on itself; one finger alone moves it in part, hence the width.",
+        ),
+    }
     section(&mut body, "Both domains in their principal axes", "");
     figure(
         &mut body,
@@ -78,6 +88,17 @@ pub(super) fn page(shown: &Shown<'_>) -> Result<String, charts::Error> {
         "The poses of hand and gripper along the axes in which they vary most, with the pairs and the six seconds from above.",
     );
     section(&mut body, "How it was trained", &metadata(shown));
+    match pictures::learning(shown)? {
+        Some(svg) => figure(
+            &mut body,
+            svg,
+            "How the cost fell. It jumps where a pair is added, where the map begins to be spread over the gripper's space, and where another start takes the lead.",
+        ),
+        None => note(
+            &mut body,
+            "No learning curve: the training left none beside the model.",
+        ),
+    }
     Ok(format!(
         "<!doctype html><html lang=\"en\"><head><meta charset=\"utf-8\">\
          <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\
@@ -95,17 +116,11 @@ fn note(body: &mut String, text: &str) {
     let _ = write!(body, "<p class=\"means\">{text}</p>");
 }
 
-/// A drawing; of a gripper of one axis some are not made.
-fn figure(body: &mut String, svg: Option<String>, caption: &str) {
-    match svg {
-        Some(svg) => {
-            let _ = write!(
-                body,
-                "<figure>{svg}<figcaption>{caption}</figcaption></figure>"
-            );
-        }
-        None => note(body, "Drawn for grippers of four axes only."),
-    }
+fn figure(body: &mut String, svg: String, caption: &str) {
+    let _ = write!(
+        body,
+        "<figure>{svg}<figcaption>{caption}</figcaption></figure>"
+    );
 }
 
 fn metadata(shown: &Shown<'_>) -> String {

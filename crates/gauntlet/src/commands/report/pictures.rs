@@ -12,6 +12,7 @@ use rig::PoseSource;
 
 use super::shown::Shown;
 use crate::played;
+use host::training::curve::Moment;
 use host::training::quality::MEASURED;
 use host::words::axis_words;
 
@@ -21,14 +22,12 @@ const DRAWN: usize = 1500;
 const REDDEST: f64 = 32.0;
 /// Bins of a histogram.
 const BINS: usize = 24;
+/// A fist: the sum of the bends of all fingers, radians.
+const MOST_BENT: f32 = 19.0;
 
 /// Six seconds of hand and gripper.
-pub(super) fn strip(shown: &Shown<'_>) -> Result<Option<String>, Error> {
-    if shown.space != Space::ThreeFinger {
-        return Ok(None);
-    }
-    let strip = moved(shown);
-    strip.draw(&JOINT_NAMES).map(|drawing| Some(drawing.svg))
+pub(super) fn strip(shown: &Shown<'_>) -> Result<String, Error> {
+    moved(shown).draw(&JOINT_NAMES).map(|drawing| drawing.svg)
 }
 
 fn moved(shown: &Shown<'_>) -> Strip {
@@ -40,19 +39,12 @@ fn moved(shown: &Shown<'_>) -> Strip {
 
 /// The pairs, a hand and a gripper each.
 pub(super) fn pairs(shown: &Shown<'_>) -> Result<Option<String>, Error> {
-    match (shown.pairs, shown.space) {
-        (Some(pairs), Space::ThreeFinger) => {
-            chosen_pairs(pairs, &JOINT_NAMES).map(|drawing| Some(drawing.svg))
-        }
-        _ => Ok(None),
-    }
+    let drawn = |pairs| chosen_pairs(pairs, &JOINT_NAMES).map(|drawing| drawing.svg);
+    shown.pairs.map(drawn).transpose()
 }
 
-/// Both domains in their principal axes.
-pub(super) fn domains(shown: &Shown<'_>) -> Result<Option<String>, Error> {
-    if shown.space != Space::ThreeFinger {
-        return Ok(None);
-    }
+/// Both domains in their principal axes; a gripper of one axis has no others than its own.
+pub(super) fn domains(shown: &Shown<'_>) -> Result<String, Error> {
     let strip = moved(shown);
     let (model, none) = (shown.model, Matrix::default());
     let marks = |inputs: bool| match shown.pairs {
@@ -75,6 +67,9 @@ pub(super) fn domains(shown: &Shown<'_>) -> Result<Option<String>, Error> {
             ends: ["q0", "q24"],
         },
     );
+    if shown.space == Space::OneAxis {
+        return panels(&[vec![hands]]).map(|Drawing { svg, .. }| svg);
+    }
     let grippers = principal(
         "the gripper's poses",
         &Domain {
@@ -87,7 +82,7 @@ pub(super) fn domains(shown: &Shown<'_>) -> Result<Option<String>, Error> {
             ends: ["x0", "x24"],
         },
     );
-    panels(&[vec![hands, grippers]]).map(|Drawing { svg, .. }| Some(svg))
+    panels(&[vec![hands, grippers]]).map(|Drawing { svg, .. }| svg)
 }
 
 fn some(targets: &Matrix) -> Matrix {
@@ -95,11 +90,42 @@ fn some(targets: &Matrix) -> Matrix {
     targets.select(&(0..targets.rows).step_by(stride).collect::<Vec<_>>())
 }
 
-/// d-Knn over the target: the images of the measured poses, two axes at a time, coloured by how far apart their neighbours' hands are.
-pub(super) fn dissimilar(shown: &Shown<'_>) -> Result<Option<String>, Error> {
-    if shown.space != Space::ThreeFinger {
-        return Ok(None);
+/// Where one axis goes as all fingers bend: the least, the mean and the greatest count.
+pub(super) fn closing(shown: &Shown<'_>) -> Result<String, Error> {
+    let mut bins = vec![(f64::INFINITY, 0.0, f64::NEG_INFINITY, 0_u32); BINS];
+    let images = shown.model.map_all(shown.frames);
+    for (pose, image) in shown.frames.iter_rows().zip(images.iter_rows()) {
+        let bends = (0..5).flat_map(|finger| [0, 3, 4].map(|joint| pose[5 * finger + joint]));
+        let share = f64::from(bends.sum::<f32>() / MOST_BENT).clamp(0.0, 0.999);
+        let bin = &mut bins[(share * BINS as f64) as usize];
+        let count = f64::from(image[0].clamp(0.0, 255.0));
+        *bin = (bin.0.min(count), bin.1 + count, bin.2.max(count), bin.3 + 1);
     }
+    let curve = |name: &str, value: fn(&(f64, f64, f64, u32)) -> f64| Curve {
+        name: name.to_owned(),
+        points: bins
+            .iter()
+            .enumerate()
+            .filter(|(_, bin)| bin.3 > 0)
+            .map(|(k, bin)| ((k as f64 + 0.5) * 100.0 / BINS as f64, value(bin)))
+            .collect(),
+    };
+    let chart = Chart {
+        title: "the fingers, as yours bend".to_owned(),
+        x_label: "all your fingers bent, %".to_owned(),
+        y_label: "counts, 0 open to 255 closed".to_owned(),
+        curves: vec![
+            curve("least", |bin| bin.0),
+            curve("mean", |bin| bin.1 / f64::from(bin.3)),
+            curve("greatest", |bin| bin.2),
+        ],
+        ..Chart::default()
+    };
+    charts(&[chart]).map(|drawing| drawing.svg)
+}
+
+/// d-Knn over the target: the images of the measured poses, two axes at a time, coloured by how far apart their neighbours' hands are.
+pub(super) fn dissimilar(shown: &Shown<'_>) -> Result<String, Error> {
     let points = shown.frames.select(&spread(shown.frames, MEASURED));
     let images = shown.model.map_all(&points);
     let inputs: Vec<Vec<f64>> = wide(&shown.model.q.apply_all(&points));
@@ -122,7 +148,7 @@ pub(super) fn dissimilar(shown: &Shown<'_>) -> Result<Option<String>, Error> {
         ..Panel::default()
     };
     let row = [[0, 1], [1, 2], [0, 3]].map(plane);
-    panels(&[row.into()]).map(|Drawing { svg, .. }| Some(svg))
+    panels(&[row.into()]).map(|Drawing { svg, .. }| svg)
 }
 
 /// How often each axis is where: what the hand's poses become, over what the gripper can do.
@@ -142,6 +168,31 @@ pub(super) fn histograms(shown: &Shown<'_>) -> Result<String, Error> {
     };
     let all: Vec<Chart> = (0..shown.space.axes()).map(chart).collect();
     charts(&all).map(|drawing| drawing.svg)
+}
+
+/// The learning curve: cost and pairs over the epochs; none where the model's training left no table.
+pub(super) fn learning(shown: &Shown<'_>) -> Result<Option<String>, Error> {
+    if shown.curve.is_empty() {
+        return Ok(None);
+    }
+    let chart = |title: &str, value: fn(&Moment) -> f64, logarithmic: bool| Chart {
+        title: title.to_owned(),
+        x_label: "epoch".to_owned(),
+        y_label: title.to_owned(),
+        logarithmic,
+        curves: vec![Curve {
+            name: title.to_owned(),
+            points: shown
+                .curve
+                .iter()
+                .map(|moment| (moment.epoch as f64, value(moment)))
+                .collect(),
+        }],
+        ..Chart::default()
+    };
+    let cost = chart("cost (Eq. 13)", |moment| moment.cost, true);
+    let pairs = chart("reference pairs", |moment| moment.pairs as f64, false);
+    charts(&[cost, pairs]).map(|drawing| Some(drawing.svg))
 }
 
 fn histogram(name: &str, samples: &Matrix, axis: usize) -> Curve {

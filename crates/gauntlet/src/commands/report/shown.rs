@@ -6,6 +6,7 @@ use host::trainer::data::{Matrix, Pairs};
 use host::trainer::hand::Space;
 use host::trainer::model::Model;
 
+use host::training::curve::Moment;
 use host::training::judgement::Judgement;
 use host::training::motion::Motion;
 
@@ -21,4 +22,5 @@ pub(super) struct Shown<'a> {
     pub pairs: Option<&'a Pairs>,
     pub held_out: Option<bool>,
     pub judgement: &'a Judgement,
+    pub curve: &'a [Moment],
 }

@@ -8,6 +8,7 @@ use host::training::PairChoice;
 
 use crate::commands::teleop::Hand as WhichHand;
 use crate::options::{ReadingOptions, model_parser};
+use crate::web::ViewOptions;
 use host::chip::link::Address;
 use host::trainer::cost::Cost;
 use host::trainer::measures::Coverage;
@@ -174,6 +175,9 @@ pub struct Worn {
         conflicts_with = "target"
     )]
     pub show_on: Option<PathBuf>,
+    /// The page.
+    #[command(flatten)]
+    pub view: ViewOptions,
 }
 
 /// What the volume occupancy of a domain from a file needs.

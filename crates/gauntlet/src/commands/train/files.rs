@@ -8,9 +8,11 @@ use anyhow::Result;
 use host::trainer::model::Model;
 
 use super::args::Train;
+use crate::note;
 use crate::outputs::{self, Kind};
 use host::failure::Failure;
 use host::next::{Command, NextStep};
+use host::training::curve::{self, Moment};
 
 /// Before minutes of training, not after.
 pub(super) fn check_outputs(options: &Train) -> Result<()> {
@@ -35,6 +37,22 @@ pub(super) fn check_outputs(options: &Train) -> Result<()> {
         // Whether it is a checkpoint is seen when it is read.
         (None, Some(path)) if path.is_file() => outputs::room(path),
         (None, _) => Ok(()),
+    }
+}
+
+/// Keeps how the cost fell, for the report. A training is worth more than its curve: where it cannot be kept, that is only said.
+pub(super) fn keep_curve(curve: &[Moment], options: &Train) {
+    let path = curve::beside(&options.out);
+    match curve::keep(curve, &options.out) {
+        Ok(true) => {}
+        Ok(false) => note!(
+            "note: {} is no learning curve, and was left as it is: the report will draw none",
+            path.display()
+        ),
+        Err(error) => note!(
+            "note: {}: {error}: the report will draw no learning curve",
+            path.display()
+        ),
     }
 }
 

@@ -16,7 +16,7 @@ use crate::progress::Person;
 use crate::results::{self, maps};
 use crate::tell::Tell;
 use crate::{note, reading};
-use host::failure::told;
+use host::failure::{Failure, told};
 use host::interrupt::Interrupt;
 use host::stats::seconds;
 use host::training::Ended;
@@ -32,6 +32,10 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     if options.live {
         return live::run(options, interrupt);
     }
+    if options.worn.view.is_wanted() {
+        let what = "the page shows a person who teaches, and here none does";
+        return Err(Failure::usage(what, "--live, or no --view and no --open").into());
+    }
     let tell = Tell::new(options.json);
     files::check_outputs(options)?;
     let mut task = reading::ended_by(interrupt, "what is to be trained on", || {
@@ -45,6 +49,7 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     };
     let mut model = task.model(&course, &learned);
     files::save(&model, options)?;
+    files::keep_curve(&learned.curve, options);
     let measured = task
         .measure(&mut model, interrupt)
         .map_err(|_| show::unmeasured(options))?;

@@ -170,8 +170,14 @@ addEventListener("keydown", (event) => {
   }
 });
 
+// Keys that a page does something else with, or that are half of another.
+const OTHERS = /^(m|t|q| |Escape|Tab|Home|Arrow.*|Shift|Control|Alt|AltGraph|Meta|CapsLock|NumLock|Dead|Unidentified)$/;
+
 function act(key) {
-  const action = picture?.actions.find((each) => each.key === key);
+  const of = (name) => picture?.actions.find((each) => each.key === name);
+  // Enter on a button presses that.
+  const pressed = key === "Enter" && document.activeElement?.closest("button, summary");
+  const action = of(key) ?? (OTHERS.test(key) || pressed ? null : of("any"));
   if (action) say("do", { what: action.name });
 }
 
@@ -308,8 +314,10 @@ function drawGripper() {
     return tip && links.length === 4 && { text, at: [tip[3], tip[4], tip[5] + 16], color: FINGERS[finger] };
   });
   stages.gripper.draw({ solid: shown, ghost, names: tips.filter(Boolean), faded: old && !teach, theme: THEMES[theme()] });
-  put("gripper-name", teach ? "show this pose" : "gripper");
-  put("gripper-note", teach ? "outline: where the map has the gripper now" : old ? `position ${gripper.age_s.toFixed(1)} s old` : "outline: asked");
+  const imagined = gripper?.is_imagined;
+  put("gripper-name", teach ? "show this pose" : imagined ? "your hand by the map" : "gripper");
+  put("gripper-note", teach ? (ghost.length ? "outline: your hand by the map so far" : "") : imagined ? "no gripper moves" : old ? `position ${gripper.age_s.toFixed(1)} s old` : "outline: asked");
+  put("axes-name", imagined ? "asked, and your hand by the map, counts" : "gripper: asked and reached, counts");
   if (gripper) axes(gripper.axes);
 }
 
@@ -457,8 +465,9 @@ function teach() {
   const teach = picture.teach;
   show("teach", teach);
   if (!teach) return;
-  put("teach-name", `teaching: round ${teach.round} of ${teach.rounds}`);
+  put("teach-name", `teaching: pose ${teach.round} of ${teach.rounds}`);
   put("teach-words", teach.words);
+  put("teach-said", teach.said ?? "");
   put("teach-refused", teach.refused ?? "");
   document.querySelector("#ring .done").style.strokeDasharray = `${100 * Math.max(0, Math.min(1, teach.held))} 100`;
   put("countdown", teach.countdown === null ? "" : String(teach.countdown));

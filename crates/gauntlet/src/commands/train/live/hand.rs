@@ -6,6 +6,7 @@ use anyhow::Result;
 use host::glove::calibration::Step;
 use host::glove::hand::{JOINT_COUNT, Side};
 
+use super::paged::OnPage;
 use crate::commands::calibrate::source::{Place, Source};
 use crate::commands::teleop::Hand as WhichHand;
 use crate::commands::train::args::Train;
@@ -15,6 +16,8 @@ use crate::live::{Key, Live};
 use crate::out;
 use crate::run::{ASK_FLAT, FLAT_WAIT};
 use crate::tell::Tell;
+use crate::web::picture::Rates;
+use crate::web::{self, Known, Picture};
 use host::calibration::profile_of;
 use host::calibration::virtual_person::VirtualPerson;
 use host::clock::ticks;
@@ -37,6 +40,8 @@ pub(super) struct Worn<'a> {
     place: &'a Place<'a>,
     source: Source,
     hand: Hand,
+    side: Side,
+    on_page: OnPage,
     pub person: Option<VirtualPerson>,
     /// The newest whole pose.
     pub angles: [f32; JOINT_COUNT],
@@ -49,8 +54,8 @@ impl<'a> Worn<'a> {
     pub fn open(
         place: &'a Place<'a>,
         options: &Train,
-        tell: &Tell,
-        interrupt: &Interrupt,
+        on_page: OnPage,
+        (tell, interrupt): (&Tell, &Interrupt),
     ) -> Result<Self> {
         let (mut source, missing) = place.open(tell, &mut LineLog::default(), interrupt)?;
         if missing > 0 {
@@ -60,11 +65,13 @@ impl<'a> Worn<'a> {
             );
             return Err(Failure::new(what, place.doctor()).into());
         }
-        let hand = known(place, &mut source, options)?;
+        let (hand, side) = known(place, &mut source, options)?;
         let mut worn = Self {
             place,
             source,
             hand,
+            side,
+            on_page,
             person: place.person(),
             angles: [0.0; JOINT_COUNT],
             newest: Instant::now(),
@@ -82,6 +89,29 @@ impl<'a> Worn<'a> {
     /// How the glove is read, in a line.
     pub fn line(&self) -> String {
         self.source.line()
+    }
+
+    /// The hand, its sensors and how it is read, for the page.
+    pub fn picture(&self) -> Picture {
+        let health = self.source.health();
+        let sigma = self.hand.headings().map(|known| known.sigma);
+        let calibrated = self.hand.is_calibrated();
+        let known = |segment: usize| Known {
+            health: health[segment],
+            unused: None,
+            sigma: sigma.map(|sigma| sigma[segment]),
+        };
+        let (frames_per_s, dropped) = self.source.rates();
+        Picture {
+            elapsed_s: self.started.elapsed().as_secs_f64(),
+            hand: Some(web::drawn_hand(&self.angles, self.side, calibrated, known)),
+            rates: Some(Rates {
+                frames_per_s,
+                dropped,
+                ..Rates::default()
+            }),
+            ..Picture::default()
+        }
     }
 
     /// The whole poses that came, waited for a moment.
@@ -124,6 +154,11 @@ impl<'a> Worn<'a> {
                 Some(scanned) => drop(self.hand.take(&scanned)),
                 None => self.hand.pass(self.source.now()),
             }
+            let why = match self.hand.flat() {
+                Flat::Waiting(why) => why.as_deref(),
+                _ => None,
+            };
+            self.on_page.show_flat(|| self.picture(), ASK_FLAT, why);
             match self.hand.flat() {
                 Flat::Taken => break,
                 Flat::Refused(why) => {
@@ -180,6 +215,9 @@ impl<'a> Worn<'a> {
             let Some(ask) = free.ask(self.now()) else {
                 break;
             };
+            if self.on_page.free(|| self.picture(), &ask, &seen(&free)) {
+                free.go_on(self.now());
+            }
             if !drawn && asked.replace(ask.number) != Some(ask.number) {
                 tell.say(format_args!(
                     "{:>2} of {}   {}",
@@ -212,10 +250,10 @@ fn seen(free: &Free) -> String {
     }
 }
 
-/// How the sensors sit.
-fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand> {
+/// How the sensors sit, and on which hand.
+fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<(Hand, Side)> {
     if options.worn.ideal {
-        return Ok(Hand::ideal(side(options)));
+        return Ok((Hand::ideal(side(options)), side(options)));
     }
     let none = |why: String| {
         let what = format!("the glove on {} is not calibrated: {why}", place.name());
@@ -236,10 +274,10 @@ fn known(place: &Place<'_>, source: &mut Source, options: &Train) -> Result<Hand
         bound
             .fits(&ids)
             .map_err(|misfit| none(misfit.to_string()))?;
-        return Ok(Hand::with_profile(&bound));
+        return Ok((Hand::with_profile(&bound), bound.profile.side));
     }
     let (_, kept) = profile_of(options.worn.profile.as_deref(), &ids)?.map_err(none)?;
-    Ok(Hand::with_profile(&kept.bound))
+    Ok((Hand::with_profile(&kept.bound), kept.bound.profile.side))
 }
 
 /// Which hand wears the glove, where no profile says.

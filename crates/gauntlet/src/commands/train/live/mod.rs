@@ -2,6 +2,7 @@
 
 mod files;
 mod hand;
+mod paged;
 mod said;
 mod session;
 mod shower;
@@ -18,7 +19,9 @@ use crate::commands::calibrate::source::Place;
 use crate::commands::glove::GloveAt;
 use crate::progress::Person;
 use crate::results::{self, maps};
+use crate::run::drawn;
 use crate::tell::Tell;
+use crate::web::Page;
 use host::failure::{Failure, told};
 use host::interrupt::Interrupt;
 use host::next::{Command, advice};
@@ -27,8 +30,10 @@ use host::teaching::kept::matrices;
 use host::teaching::{Aim, Learner};
 use host::training::judgement::Judgement;
 use host::training::lessons::Lessons;
+use host::training::pairs_kept::reference_pairs;
 use host::training::quality::Quality;
 use host::training::{Course, PairKind};
+use paged::OnPage;
 use session::{Session, Shown};
 use shower::Shower;
 
@@ -45,9 +50,13 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let rounds = rounds(options)?;
     let files = files::Files::of(options, &aim)?;
     let place = place(options)?;
-    let mut worn = hand::Worn::open(&place, options, &tell, interrupt)?;
+    let page = Page::start(&options.worn.view, &tell)?;
+    let drawn = aim.space().map(|_| drawn(options.gripper_model));
+    let on_page = OnPage::new(page, drawn);
+    let mut worn = hand::Worn::open(&place, options, on_page.clone(), (&tell, interrupt))?;
     let begun = Instant::now();
     let motion = files.motion(&mut worn, options, &tell, interrupt)?;
+    let on_page = on_page.of_motion(&motion.frames());
     // --resume names pairs here, no checkpoint.
     let course = Course {
         checkpoint: None,
@@ -62,7 +71,9 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     let learner = Learner::start(lessons)?;
     let shower = (options.worn.show_on.as_deref())
         .map(|gripper| Shower::new(gripper, options.gripper_model));
-    let mut session = Session::new(worn, learner, &aim, rounds, &files, options.json).on(shower);
+    let mut session = Session::new(worn, learner, &aim, rounds, &files, options.json)
+        .on(shower)
+        .on_page(on_page.clone());
     let led = session.lead(&tell, interrupt);
     let done = session.finish()?;
     if led.map_err(|error| files.goes_on(error, &done.pairs))? == Shown::Stopped {
@@ -70,15 +81,17 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     }
     lessons = done.lessons;
     let pairs = matrices(&done.pairs);
-    let finished = lessons.finish(pairs.clone(), &Person, interrupt)?;
+    let finished = lessons.finish(pairs.clone(), &on_page, interrupt)?;
+    on_page.show_map(aim.space(), &finished.model, &done.pairs);
     super::files::save(&finished.model, options)?;
+    super::files::keep_curve(&finished.learned.curve, options);
     let mut warnings = finished.learned.warnings.clone();
     let judgement = aim.space().map(|space| {
         let quality = Quality::from_measured(&finished.measured, space);
         Judgement::of(
             (&finished.model, space),
             &motion.frames(),
-            Some(&pairs),
+            reference_pairs(&finished.model).as_ref(),
             quality,
         )
     });
@@ -109,6 +122,9 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
             .and_then(|judgement| judgement.pairs.as_ref())
             .map(|pairs| pairs.off().into()),
     };
+    if let Some(judgement) = &judgement {
+        on_page.show_end(&said::lines(judgement), judgement.good());
+    }
     if options.json {
         return results::print("train --live", taught);
     }
@@ -117,7 +133,11 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
         seconds(finished.learned.took)
     ));
     match &judgement {
-        Some(judgement) => said::verdict(judgement, &tell),
+        Some(judgement) => {
+            for (name, text) in said::lines(judgement) {
+                tell.say(format_args!("{name:<11}{text}"));
+            }
+        }
         None => {
             for line in finished.measured.lines() {
                 tell.say(format_args!("quality    {line}"));

@@ -8,6 +8,7 @@ use host::trainer::model::Model;
 
 use super::files::Files;
 use super::hand::Worn;
+use super::paged::OnPage;
 use super::shower::Shower;
 use crate::live::teach::{Doing, TeachView};
 use crate::live::{Key, Live};
@@ -58,6 +59,7 @@ pub(super) struct Session<'a> {
     slowest: Duration,
     /// The gripper that shows the poses, where one does.
     shower: Option<Shower>,
+    on_page: OnPage,
 }
 
 impl<'a> Session<'a> {
@@ -82,12 +84,18 @@ impl<'a> Session<'a> {
             taken: None,
             slowest: Duration::ZERO,
             shower: None,
+            on_page: OnPage::default(),
         }
     }
 
     /// The same with a gripper that shows the poses.
     pub fn on(self, shower: Option<Shower>) -> Self {
         Self { shower, ..self }
+    }
+
+    /// The same shown on a page, too.
+    pub fn on_page(self, on_page: OnPage) -> Self {
+        Self { on_page, ..self }
     }
 
     /// Leads the person through it.
@@ -122,9 +130,12 @@ impl<'a> Session<'a> {
                 };
                 self.teaching.act(act, self.worn.now());
             }
+            for act in self.look_at_page() {
+                self.teaching.act(act, self.worn.now());
+            }
             let state = self.teaching.ask(self.worn.now()).state;
             // Without a person at the keys nobody says when it is enough.
-            if state == State::Trying && !drawn {
+            if state == State::Trying && !drawn && !self.on_page.is_watched() {
                 self.teaching.act(Act::Finish, self.worn.now());
             }
             if state == State::Finished {
@@ -136,6 +147,13 @@ impl<'a> Session<'a> {
         }
     }
 
+    /// Shows what is asked for on the page, and returns what was asked for there.
+    fn look_at_page(&self) -> Vec<Act> {
+        let map = self.map.as_ref().map(|map| map.map(&self.worn.angles));
+        self.on_page
+            .poses(|| self.worn.picture(), || self.view(), map.as_deref())
+    }
+
     /// Takes what came.
     fn round(&mut self, tell: &Tell, drawn: bool) -> Result<()> {
         for pose in self.worn.poses()? {
@@ -143,6 +161,11 @@ impl<'a> Session<'a> {
         }
         self.teaching.pass(self.worn.now());
         while let Some(learned) = self.learner.answer(Duration::ZERO)? {
+            self.on_page.show_map(
+                self.teaching.aim().space(),
+                &learned.model,
+                self.teaching.pairs(),
+            );
             self.map = Some(learned.model);
             self.teaching
                 .learned(learned.number, learned.target, self.worn.now());

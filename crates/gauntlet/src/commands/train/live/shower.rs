@@ -1,5 +1,5 @@
 //! The pose to mimic on a gripper that is there, where that was asked for: by `gauntlet gripper move`, in a process of its own, so that
-//! all it promises holds here, too (never more than 40 counts ahead of the gripper; a hold when it is ended).
+//! all it promises holds here, too (never more than 40 counts ahead of the gripper; a hold when it is ended, or this program is killed).
 
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -80,6 +80,8 @@ impl Shower {
                 &to.join(","),
             ])
             .args(["--speed", SPEED, "--force", FORCE])
+            // It holds also where this program is killed outright.
+            .args(["--ends-with", &std::process::id().to_string()])
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
