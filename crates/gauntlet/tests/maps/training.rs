@@ -243,6 +243,7 @@ fn train_gives_the_verdict_that_eval_gives_and_few_rows_are_not_silently_fine() 
     assert_eq!(json(&output)["good"], false);
     let output = run(&["eval", "--model", out, "--poses", poses]);
     assert!(support::text(&output.stdout).contains("verdict            not good enough"));
+    assert!(support::text(&output.stdout).contains("\n  try: train again"));
 }
 
 #[test]

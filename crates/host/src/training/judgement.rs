@@ -208,6 +208,12 @@ impl Judgement {
         self.faults.iter().all(Fault::is_doubt)
     }
 
+    /// What helps against the worst of what is wrong; `None` where the map is good.
+    pub fn advice(&self) -> Option<&'static str> {
+        let wrong = self.faults.iter().find(|fault| !fault.is_doubt());
+        wrong.map(Fault::advice)
+    }
+
     /// Each fault as data.
     pub fn named(&self) -> Vec<Named> {
         let name = |fault: &Fault| Named {

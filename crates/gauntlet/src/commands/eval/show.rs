@@ -29,6 +29,9 @@ pub(super) fn hand(file: &Path, model: &Model, judgement: &Judgement) {
         .map_or_else(String::new, |most| format!("   (good: {most} or less)"));
     say!("d-Knn              {:.3}{bar}", quality.d_knn);
     say!("verdict            {judgement}");
+    if let Some(advice) = judgement.advice() {
+        say!("  try: {advice}");
+    }
     trained_with(model);
 }
 

@@ -101,6 +101,9 @@ pub(crate) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     }
     if let Some(judgement) = &judgement {
         tell.say(format_args!("verdict    {judgement}"));
+        if let Some(advice) = judgement.advice() {
+            tell.say(format_args!("  try: {advice}"));
+        }
     }
     tell.say(format_args!("model      {}", options.out.display()));
     Ok(())

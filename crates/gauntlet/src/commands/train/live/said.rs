@@ -7,6 +7,11 @@ pub(super) fn lines(judgement: &Judgement) -> Vec<(&'static str, String)> {
     let mut lines = vec![("verdict", judgement.to_string())];
     lines.extend(
         judgement
+            .advice()
+            .map(|advice| ("", format!("try: {advice}"))),
+    );
+    lines.extend(
+        judgement
             .influence
             .words()
             .into_iter()
