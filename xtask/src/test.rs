@@ -168,7 +168,7 @@ fn built() -> Result<PathBuf, Failure> {
 fn tests(firmware: Option<&Path>, binaries: &Path, skips: &Skips) -> Result<(), Failure> {
     step::run(
         "tests",
-        prepared(&["nextest", "run", "--workspace"], firmware, skips)
+        prepared(&["nextest", "run"], firmware, skips)
             .arg("--binaries-metadata")
             .arg(binaries),
     )?;
