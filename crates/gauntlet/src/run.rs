@@ -38,6 +38,8 @@ pub use on_page::drawn;
 
 /// Pause between two rounds: heartbeats, keys and records are looked after this often.
 const ROUND: Duration = Duration::from_millis(20);
+/// For a person to answer a question: what waits for the log's file is bounded.
+const ANSWER: Duration = Duration::from_secs(60);
 /// Pause between two heartbeats of the clutch.
 const HEARTBEAT: Duration = Duration::from_micros(host::bridge::timing::HEARTBEAT.as_micros());
 /// By then whoever wrote beyond a file's limit was told.
@@ -200,7 +202,7 @@ impl Run {
         }
     }
 
-    /// Asks a person, while the session is looked after. `false` where there is no terminal to ask on.
+    /// Asks a person, while the session is looked after. `false` where there is no terminal to ask on, or no answer in a minute.
     ///
     /// # Errors
     /// What ended the bridge.
@@ -210,7 +212,8 @@ impl Run {
             return Ok(false);
         }
         out::ask(format_args!("{question}"));
-        while !self.interrupt.sleep(ROUND) {
+        let end = Instant::now() + ANSWER;
+        while Instant::now() < end && !self.interrupt.sleep(ROUND) {
             self.round()?;
             let mut descriptors = [PollFd::new(&stdin, PollFlags::IN)];
             let nothing = Timespec {

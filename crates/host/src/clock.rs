@@ -93,9 +93,58 @@ pub fn rfc3339(at: SystemTime) -> String {
     format!("{year:04}-{month:02}-{day:02}T{hour:02}:{minute:02}:{second:02}Z")
 }
 
+/// How long nothing has come, without the time in which this program stood still and could not have heard it.
+#[derive(Debug)]
+pub struct QuietTime {
+    lasted: Duration,
+    /// Since the computer's start.
+    looked: Duration,
+}
+
+/// Between two looks of a program that does not stand still.
+const LOOKS: Duration = Duration::from_millis(500);
+
+impl QuietTime {
+    /// From now on.
+    pub fn begin() -> Self {
+        Self {
+            lasted: Duration::ZERO,
+            looked: since_boot(),
+        }
+    }
+
+    /// Something came.
+    pub fn end(&mut self) {
+        *self = Self::begin();
+    }
+
+    /// How long it has lasted.
+    pub fn look(&mut self) -> Duration {
+        self.look_at(since_boot())
+    }
+
+    fn look_at(&mut self, now: Duration) -> Duration {
+        self.lasted += now.saturating_sub(self.looked).min(LOOKS);
+        self.looked = now;
+        self.lasted
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_silence_does_not_count_the_time_in_which_nobody_listened() {
+        let mut silence = QuietTime::begin();
+        let begun = silence.looked;
+        for tenth in 1..=20 {
+            silence.look_at(begun + Duration::from_millis(100 * tenth));
+        }
+        // Stopped for an hour.
+        let lasted = silence.look_at(begun + Duration::from_secs(3_602));
+        assert_eq!(lasted, Duration::from_millis(2_500));
+    }
 
     #[test]
     fn dates_are_those_of_the_calendar() {

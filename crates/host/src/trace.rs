@@ -274,30 +274,36 @@ impl TraceLog {
 
     /// What waits.
     pub fn take(&self) -> Vec<Block> {
+        // Memory is asked for and given back outside the lock, for which the bridge's thread would wait.
+        let mut next = Block::new(0);
         let Some(mut recorder) = self.lock() else {
             return Vec::new();
         };
         let waiting = recorder.sink_mut();
         let mut blocks = std::mem::take(&mut waiting.full);
-        let next = Block::new(waiting.newest.at);
-        blocks.push(std::mem::replace(&mut waiting.newest, next));
-        blocks.retain(|block| !block.bytes.is_empty());
+        (next.since, next.at) = (waiting.newest.at, waiting.newest.at);
+        let newest = std::mem::replace(&mut waiting.newest, next);
         waiting.bytes = 0;
         let missing = std::mem::take(&mut waiting.missing);
         if missing > 0 {
             recorder.note(&Entry::Lost { bytes: missing });
         }
+        drop(recorder);
+        blocks.push(newest);
+        blocks.retain(|block| !block.bytes.is_empty());
         blocks
     }
 
     /// Nothing is taken any more: nothing need wait.
     pub fn close(&self) {
+        let mut given_back = (Vec::new(), Vec::new());
         if let Some(mut recorder) = self.lock() {
             let waiting = recorder.sink_mut();
             waiting.closed = true;
-            waiting.full = Vec::new();
-            waiting.newest.bytes = Vec::new();
+            given_back.0 = std::mem::take(&mut waiting.full);
+            given_back.1 = std::mem::take(&mut waiting.newest.bytes);
         }
+        drop(given_back);
     }
 
     /// Bytes that found no room, so that a replay ends where they are missing.

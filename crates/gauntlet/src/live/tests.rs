@@ -187,7 +187,7 @@ fn faults_that_do_not_fit_are_counted() {
     terminal.draw(|frame| view.draw(frame)).unwrap();
     let text = terminal.backend().to_string();
     assert!(
-        text.contains("fault 1") && text.contains("and 8 more"),
+        text.contains("fault 1") && text.contains("and 6 more"),
         "{text}"
     );
 }

@@ -31,12 +31,16 @@ impl Guard {
     /// For a server at `address`, with `token`.
     pub(super) fn new(address: SocketAddr, token: String) -> Self {
         let port = address.port();
-        let hosts = match address.ip().is_loopback() {
-            true => ["127.0.0.1", "localhost", "[::1]"]
-                .map(|host| format!("{host}:{port}"))
-                .into(),
-            false => vec![address.to_string()],
-        };
+        let mut hosts = vec![address.to_string()];
+        if address.ip().is_loopback() {
+            let names = ["127.0.0.1", "localhost", "[::1]"];
+            hosts.extend(names.map(|host| format!("{host}:{port}")));
+        }
+        // Browsers leave the usual port out.
+        let bare: Vec<String> = (hosts.iter().filter_map(|host| host.strip_suffix(":80")))
+            .map(str::to_owned)
+            .collect();
+        hosts.extend(bare);
         Self { hosts, token }
     }
 

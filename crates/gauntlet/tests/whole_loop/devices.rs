@@ -63,7 +63,7 @@ fn teleop_drives_the_simulated_gripper_and_logs_it() {
         "{same}"
     );
     assert_eq!(same["other"]["output"]["max"], 0.0, "the same map: {same}");
-    let watched = support::run(&["replay", log, "--speed", "20"]);
+    let watched = support::run(&["replay", log, "--speed", "3"]);
     let seen = text(&watched.stdout);
     assert_eq!(watched.status.code(), Some(0), "{}", text(&watched.stderr));
     assert!(

@@ -49,6 +49,8 @@ pub(super) struct Whole {
     span: Option<(u64, u64)>,
     /// Where the last closed chunk ends.
     bytes: u64,
+    /// Bytes of the trace that found no room before the file was there.
+    pub trace_lost: u64,
 }
 
 impl Whole {
@@ -62,17 +64,18 @@ impl Whole {
 /// A file that takes nothing more after its first error: what a library writes when it is dropped stays away.
 struct Sink {
     file: File,
-    failed: bool,
+    failed: Arc<AtomicBool>,
 }
 
 impl Write for Sink {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.failed {
+        if self.failed.load(Ordering::Relaxed) {
             return Err(io::Error::other("it failed before"));
         }
         let written = self.file.write(bytes);
         if let Err(error) = &written {
-            self.failed = error.kind() != io::ErrorKind::Interrupted;
+            let failed = error.kind() != io::ErrorKind::Interrupted;
+            self.failed.store(failed, Ordering::Relaxed);
         }
         written
     }
@@ -87,6 +90,11 @@ pub(super) struct LogFile {
     writer: Writer<NoSeek<Sink>>,
     /// The same file, to mend its end.
     file: File,
+    trace_lost: u64,
+    /// It takes nothing more.
+    failed: Arc<AtomicBool>,
+    /// Another program removed it or cut it short: what is left is not ours to mend.
+    is_taken: bool,
     ids: [u16; CHANNELS.len()],
     sequence: [u32; CHANNELS.len()],
     decoder: Decoder,
@@ -130,9 +138,10 @@ impl LogFile {
         clock: Clock,
         fault: Arc<OnceLock<String>>,
     ) -> anyhow::Result<Self> {
+        let failed = Arc::new(AtomicBool::new(false));
         let sink = Sink {
             file: file.try_clone()?,
-            failed: false,
+            failed: Arc::clone(&failed),
         };
         let mut writer = WriteOptions::new()
             .compression(None)
@@ -159,6 +168,9 @@ impl LogFile {
         let mut log = Self {
             writer,
             file,
+            trace_lost: 0,
+            failed,
+            is_taken: false,
             ids,
             sequence: [0; CHANNELS.len()],
             decoder: Decoder::new(drawn),
@@ -182,6 +194,7 @@ impl LogFile {
         let result = self
             .write_until_end(records, closing)
             .and_then(|()| self.write_trace(records, true));
+        self.trace_lost = records.trace.lost();
         records.trace.close();
         self.note(&result);
     }
@@ -313,6 +326,8 @@ impl LogFile {
     fn close_chunk(&mut self) -> McapResult<()> {
         if let Some(what) = self.taken()? {
             self.whole = Whole::default();
+            self.is_taken = true;
+            self.failed.store(true, Ordering::Relaxed);
             return Err(io::Error::other(what).into());
         }
         self.writer.flush()?;
@@ -343,11 +358,14 @@ impl LogFile {
             });
             self.note(&result);
         }
-        if self.fault.get().is_some() {
+        if self.fault.get().is_some() && !self.is_taken {
             // What cannot be mended stays as it is: readers take whole records from the start.
             let _ = self.end_after_last_chunk();
         }
-        self.whole
+        Whole {
+            trace_lost: self.trace_lost,
+            ..self.whole
+        }
     }
 
     fn note(&self, result: &McapResult<()>) {

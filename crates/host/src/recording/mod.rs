@@ -82,7 +82,7 @@ impl Written {
         let (path, messages) = (self.path.display(), self.messages);
         let lost = match self.lost {
             0 => String::new(),
-            lost => format!(", {lost} records lost: the disk was too slow"),
+            lost => format!(", {lost} records lost: they waited too long for the file"),
         };
         match &self.fault {
             None => format!("{path} with {messages} messages{lost}"),
@@ -105,6 +105,16 @@ impl Written {
             }
         }
     }
+}
+
+/// What is wrong with a log whose trace has a hole of so many bytes.
+fn without(bytes: u64) -> Option<String> {
+    let said = || {
+        format!(
+            "{bytes} bytes of its trace found no room before the file was there, and a replay ends there"
+        )
+    };
+    (bytes > 0).then(said)
 }
 
 impl SessionLog {
@@ -171,7 +181,11 @@ impl SessionLog {
             messages: whole.messages,
             covers: whole.covers(),
             lost: self.lost.load(Ordering::Relaxed),
-            fault: self.fault.get().cloned(),
+            fault: self
+                .fault
+                .get()
+                .cloned()
+                .or_else(|| without(whole.trace_lost)),
         }
     }
 

@@ -282,15 +282,23 @@ fn a_file_that_is_there_is_never_written_over_not_even_an_empty_one() {
 #[test]
 fn a_log_that_another_program_removes_or_cuts_short_is_told_while_it_is_written() {
     type Harm = fn(&Path) -> std::io::Result<()>;
-    let harms: [(Harm, &str); 2] = [
+    let harms: [(Harm, &str); 3] = [
         (|path| std::fs::remove_file(path), "removed"),
         (|path| std::fs::write(path, ""), "cut it short"),
+        (
+            |path| {
+                let file = std::fs::OpenOptions::new().write(true).open(path)?;
+                file.set_len(file.metadata()?.len() - 9)
+            },
+            "cut it short",
+        ),
     ];
     for (harm, word) in harms {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("s.mcap");
         let (log, feed) = log(&path, records());
         harm(&path).unwrap();
+        let left = std::fs::read(&path).ok();
         let end = std::time::Instant::now() + std::time::Duration::from_secs(20);
         while log.fault().is_none() {
             assert!(std::time::Instant::now() < end, "{word}: not told");
@@ -304,6 +312,7 @@ fn a_log_that_another_program_removes_or_cuts_short_is_told_while_it_is_written(
         );
         assert_eq!(written.messages, 0);
         assert!(written.judge().is_err());
+        assert!(std::fs::read(&path).ok() == left, "{word}: written on");
     }
 }
 

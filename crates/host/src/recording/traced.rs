@@ -126,11 +126,11 @@ impl Traced {
             gap,
         };
         let mut reader = Reader::new(&bytes);
-        let mut began = false;
+        let (mut began, mut unreadable) = (false, None);
         while let Some(entry) = reader.peek() {
             match entry {
                 Entry::Head { .. } => began = true,
-                Entry::Part { part, bytes } => traced.take(part, bytes),
+                Entry::Part { part, bytes } => unreadable = unreadable.or(traced.take(part, bytes)),
                 _ => break,
             }
             // It was read once.
@@ -145,6 +145,10 @@ impl Traced {
                 advice("a log of ").then(Command::gauntlet("demo").option("--log", "session.mcap"));
             return Err(Failure::new(format!("{}: {missing}", what()), next).into());
         }
+        if let Some(part) = unreadable {
+            let why = format!("{}: {part} in it cannot be read", what());
+            return Err(Failure::new(why, "another log: this one is damaged").into());
+        }
         let model = traced.home.gripper_model.parse();
         traced.model = model
             .map_err(|error: String| Failure::new(format!("{}: {error}", what()), "another log"))?;
@@ -152,16 +156,20 @@ impl Traced {
         Ok(traced)
     }
 
-    fn take(&mut self, part: Part, bytes: &[u8]) {
+    /// Returns what of it cannot be read.
+    fn take(&mut self, part: Part, bytes: &[u8]) -> Option<&'static str> {
         match part {
             Part::Image => self.image = bytes.to_vec(),
             Part::Settings => self.settings = bytes.to_vec(),
-            Part::Profile => self.profile = Bound::from_bytes(bytes).ok(),
-            Part::Home => {
-                if let Ok(home) = serde_json::from_slice(bytes) {
-                    self.home = home;
-                }
-            }
+            Part::Profile => match Bound::from_bytes(bytes) {
+                Ok(profile) => self.profile = Some(profile),
+                Err(_) => return Some("the profile"),
+            },
+            Part::Home => match serde_json::from_slice(bytes) {
+                Ok(home) => self.home = home,
+                Err(_) => return Some("what says how glove and gripper were driven"),
+            },
         }
+        None
     }
 }

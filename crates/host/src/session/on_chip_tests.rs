@@ -357,6 +357,8 @@ fn what_a_bridge_on_a_chip_tells_is_handed_to_who_keeps_it_at_this_computers_tim
     let session = OnChip::start(link, clock, None, Some(feed)).unwrap();
     assert!(session.order(Order::Engage));
     until(&session, |seen| seen.state == State::Following);
+    // A sample comes every 50 ms.
+    std::thread::sleep(Duration::from_millis(300));
     drop(session);
     let kept: Vec<Record> = records.records.iter().collect();
     let end = clock.now();

@@ -1,7 +1,7 @@
 //! The training on a thread of its own, so that neither the view nor the glove waits for it.
 
-use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
@@ -12,7 +12,7 @@ use trainer::model::Model;
 use crate::failure::{Failure, OrFail};
 use crate::training::lessons::Lessons;
 
-/// Questions, and answers, that may wait; of the questions only the newest counts.
+/// Answers that may wait.
 const QUEUE: usize = 16;
 
 /// A question: what comes after these pairs?
@@ -41,10 +41,15 @@ pub struct Learned {
     pub took: Duration,
 }
 
+/// The newest question that was not answered yet: none before it counts.
+type Newest = Arc<Mutex<Option<Wanted>>>;
+
 /// A training on its thread.
 #[derive(Debug)]
 pub struct Learner {
-    questions: Option<SyncSender<Wanted>>,
+    newest: Newest,
+    /// Wakes it.
+    questions: Option<SyncSender<()>>,
     answers: Receiver<Result<Learned>>,
     thread: Option<JoinHandle<Lessons>>,
 }
@@ -55,26 +60,31 @@ impl Learner {
     /// # Errors
     /// The system gives no thread.
     pub fn start(lessons: Lessons) -> Result<Self> {
-        let (questions, asked) = sync_channel(QUEUE);
+        let (questions, asked) = sync_channel(1);
+        let newest = Newest::default();
+        let waiting = Arc::clone(&newest);
         let (answer, answers) = sync_channel(QUEUE);
         let thread = std::thread::Builder::new()
             .name("learner".to_owned())
-            .spawn(move || work(lessons, &asked, &answer))
+            .spawn(move || work(lessons, (&asked, &waiting), &answer))
             .or_fail(
                 || "nothing can be learned".to_owned(),
                 "ending other programs",
             )?;
         Ok(Self {
+            newest,
             questions: Some(questions),
             answers,
             thread: Some(thread),
         })
     }
 
-    /// Asks. Never waits: a learner that is so far behind has newer questions to answer.
+    /// Asks, in place of what was asked before and not begun yet. Never waits.
     pub fn ask(&self, wanted: Wanted) {
+        *self.newest.lock().unwrap_or_else(PoisonError::into_inner) = Some(wanted);
         if let Some(questions) = &self.questions {
-            let _ = questions.try_send(wanted);
+            // Where it was woken already it finds the newer one.
+            let _ = questions.try_send(());
         }
     }
 
@@ -114,13 +124,15 @@ fn fault() -> anyhow::Error {
 
 fn work(
     mut lessons: Lessons,
-    asked: &Receiver<Wanted>,
+    (asked, newest): (&Receiver<()>, &Mutex<Option<Wanted>>),
     answer: &SyncSender<Result<Learned>>,
 ) -> Lessons {
-    while let Ok(mut wanted) = asked.recv() {
-        while let Ok(newer) = asked.try_recv() {
-            wanted = newer;
-        }
+    while asked.recv().is_ok() {
+        let mut place = newest.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(wanted) = place.take() else {
+            continue;
+        };
+        drop(place);
         let began = Instant::now();
         let lesson = lessons.next(&wanted.start, &wanted.taught, &wanted.passed_over);
         let learned = lesson.map(|lesson| Learned {

@@ -10,6 +10,7 @@ use crate::progress::Progress;
 use crate::results::gloves;
 use crate::web::picture::{Guide, Headline, Tone};
 use crate::web::{self, Page, Picture};
+use host::clock::QuietTime;
 use host::interrupt::Interrupt;
 use host::recording::poses::Row;
 use host::scanning::{Hand, Scanned, Scanning};
@@ -51,7 +52,7 @@ pub(super) struct Session {
     written: u64,
     passed_over: u64,
     movements: Movements,
-    newest: Instant,
+    quiet_time: QuietTime,
     /// The page, and whose hand it shows.
     page: Option<Page>,
     side: Side,
@@ -74,7 +75,7 @@ impl Session {
             written: 0,
             passed_over: 0,
             movements: Movements::default(),
-            newest: Instant::now(),
+            quiet_time: QuietTime::begin(),
             page: None,
             side: Side::Right,
             began: Instant::now(),
@@ -158,7 +159,7 @@ impl Session {
         if !self.scanning.running() {
             return Err(Gone::Ended(self.scanning.ended()));
         }
-        if self.newest.elapsed() >= SILENT {
+        if self.quiet_time.look() >= SILENT {
             return Err(Gone::Silent);
         }
         match self.hand.is_calibrated() {
@@ -168,7 +169,7 @@ impl Session {
     }
 
     fn take(&mut self, scan: &Scanned, interrupt: &Interrupt) {
-        self.newest = Instant::now();
+        self.quiet_time.end();
         let pose = self.hand.take(scan);
         self.angles = pose.angles;
         if let Some(feed) = &self.feed {

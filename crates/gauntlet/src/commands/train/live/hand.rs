@@ -21,7 +21,7 @@ use crate::web::picture::Rates;
 use crate::web::{self, Known, Picture};
 use host::calibration::virtual_person::VirtualPerson;
 use host::calibration::{may_be_ideal, profile_of};
-use host::clock::ticks;
+use host::clock::{QuietTime, ticks};
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::next::{Command, NextStep};
@@ -46,7 +46,7 @@ pub(super) struct Worn<'a> {
     pub person: Option<VirtualPerson>,
     /// The newest whole pose.
     pub angles: [f32; JOINT_COUNT],
-    newest: Instant,
+    quiet_time: QuietTime,
     pub started: Instant,
 }
 
@@ -75,7 +75,7 @@ impl<'a> Worn<'a> {
             on_page,
             person: place.person(),
             angles: [0.0; JOINT_COUNT],
-            newest: Instant::now(),
+            quiet_time: QuietTime::begin(),
             started: Instant::now(),
         };
         worn.lies_flat(tell, interrupt)?;
@@ -120,7 +120,7 @@ impl<'a> Worn<'a> {
         let mut poses = Vec::new();
         let mut scanned = self.source.next(ROUND)?;
         while let Some(scan) = scanned {
-            self.newest = Instant::now();
+            self.quiet_time.end();
             let pose = self.hand.take(&scan);
             if pose.is_whole() {
                 self.angles = pose.angles;
@@ -128,7 +128,7 @@ impl<'a> Worn<'a> {
             }
             scanned = self.source.next(Duration::ZERO)?;
         }
-        if self.newest.elapsed() >= SILENT {
+        if self.quiet_time.look() >= SILENT {
             let what = format!("the glove on {} no longer sends scans", self.place.name());
             return Err(Failure::new(what, self.place.doctor()).into());
         }
@@ -182,7 +182,7 @@ impl<'a> Worn<'a> {
         if let Some(person) = &self.person {
             person.let_go();
         }
-        self.newest = Instant::now();
+        self.quiet_time.end();
         Ok(())
     }
 

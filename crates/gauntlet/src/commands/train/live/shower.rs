@@ -2,6 +2,7 @@
 //! all it promises holds here, too (never more than 40 counts ahead of the gripper; a hold when it is ended, or this program is killed).
 
 use std::io::Read;
+use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -130,6 +131,8 @@ impl Shower {
             .args(["--speed", SPEED, "--force", FORCE])
             // It holds also where this program is killed outright.
             .args(["--ends-with", &std::process::id().to_string()])
+            // What is typed at the terminal is this program's to hear: it ends the move itself.
+            .process_group(0)
             .stdin(Stdio::null())
             .stdout(Stdio::null())
             .stderr(Stdio::piped())
