@@ -64,45 +64,6 @@ pub fn run(name: &str, command: &mut Command) -> Result<(), Failure> {
     Ok(())
 }
 
-/// The same in the time that nothing else on the machine wants; its output in one piece at its end.
-pub fn beside(name: &str, command: &mut Command) -> Result<(), Failure> {
-    println!("==> {name}, beside the others");
-    let started = Instant::now();
-    let output = in_idle_time(command)
-        .output()
-        .map_err(|error| format!("{name}: cannot start {:?}: {error}", command.get_program()))?;
-    let seconds = started.elapsed().as_secs_f64();
-    if output.status.success() {
-        println!("<== {name}: {seconds:.1} s beside the others");
-        return Ok(());
-    }
-    let said = [output.stdout, output.stderr].concat();
-    println!("{}", String::from_utf8_lossy(&said));
-    let failure = format!(
-        "{name} failed ({}) after {seconds:.1} s; its lines, up there, say why",
-        output.status
-    );
-    println!("<== {failure}");
-    Err(failure)
-}
-
-/// `command`, run in idle time.
-fn in_idle_time(command: &Command) -> Command {
-    let mut idle = Command::new("chrt");
-    idle.args(["--idle", "0"]);
-    idle.arg(command.get_program()).args(command.get_args());
-    for (name, value) in command.get_envs() {
-        match value {
-            Some(value) => idle.env(name, value),
-            None => idle.env_remove(name),
-        };
-    }
-    if let Some(folder) = command.get_current_dir() {
-        idle.current_dir(folder);
-    }
-    idle
-}
-
 /// Becomes `command`: whoever ends this process (Ctrl-C, `kill` by its id) ends that program, and none is left behind.
 pub fn become_program(name: &str, command: &mut Command) -> Failure {
     println!("==> {name}");

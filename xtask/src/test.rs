@@ -5,7 +5,6 @@ use crate::setup::{self, Leave, Scope};
 use crate::skips::{Kind, Skips};
 use crate::step::{self, Failure, cargo};
 use crate::{firmware, thumb};
-use std::fs::File;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
@@ -44,8 +43,7 @@ const OUTSIDE: [&str; 5] = [
     "fuzz",
 ];
 
-/// Format, the microcontroller's builds, all tests and beside them clippy and documentation; then what was left out, whatever
-/// the outcome.
+/// Format, the microcontroller's builds, clippy, documentation and all tests; then what was left out, whatever the outcome.
 pub fn run(options: Options) -> Result<(), Failure> {
     let started = Instant::now();
     let mut skips = Skips::begin()?;
@@ -78,21 +76,8 @@ fn all(Options { scope, leave }: Options, skips: &mut Skips) -> Result<(), Failu
         let why = "Debian's compiler brings none";
         skips.add(Kind::Chip, "clippy of the firmware", why)?;
     }
-    let nextest = step::succeeds(&mut cargo(&["nextest", "--version"]));
-    if nextest {
-        let binaries = built()?;
-        // Most tests wait most of the time: what only computes fits beside them.
-        std::thread::scope(|scope| {
-            let read = scope.spawn(|| read_through(with_chip));
-            let tests = tests(firmware.as_deref(), &binaries, skips);
-            tests.and(read.join().unwrap_or_else(|_| Err("the lints".into())))
-        })?;
-    } else {
-        println!("no cargo-nextest (cargo install cargo-nextest --locked): tests by cargo test");
-        read_through(with_chip)?;
-        let all = ["test", "--workspace", "--locked"];
-        step::run("tests", &mut prepared(&all, firmware.as_deref(), skips))?;
-    }
+    read_through(with_chip)?;
+    tests(firmware.as_deref(), skips)?;
     if let Some(elf) = &firmware {
         println!("==> instruction counts on the emulated chip");
         let started = Instant::now();
@@ -102,16 +87,16 @@ fn all(Options { scope, leave }: Options, skips: &mut Skips) -> Result<(), Failu
     Ok(())
 }
 
-/// The lints and the documentation, also of the firmware where `with_chip`, in the time that nothing else wants.
+/// The lints and the documentation, also of the firmware where `with_chip`.
 fn read_through(with_chip: bool) -> Result<(), Failure> {
     let clippy = ["clippy", "--workspace", "--all-targets", "--locked"];
-    step::beside("clippy", cargo(&clippy).args(["--", "-D", "warnings"]))?;
-    step::beside("docs", &mut docs_command())?;
+    step::run("clippy", cargo(&clippy).args(["--", "-D", "warnings"]))?;
+    step::run("docs", &mut docs_command())?;
     if !with_chip {
         return Ok(());
     }
     let root = step::workspace_root();
-    step::beside(
+    step::run(
         "clippy of the firmware",
         cargo(&["clippy", "--release", "--locked", "--target", thumb::TARGET])
             .args(["--", "-D", "warnings"])
@@ -151,35 +136,22 @@ fn prepared(arguments: &[&str], firmware: Option<&Path>, skips: &Skips) -> Comma
     command
 }
 
-/// Builds the tests; the file that lists their programs. With it nextest asks cargo for nothing, whose lock the lints have.
-fn built() -> Result<PathBuf, Failure> {
-    let list = step::workspace_root().join("target/nextest-binaries.json");
-    let file = File::create(&list).map_err(|error| format!("{}: {error}", list.display()))?;
-    step::run(
-        "tests: build",
-        cargo(&["nextest", "list", "--workspace", "--locked"])
-            .args(["--list-type", "binaries-only", "--message-format", "json"])
-            .stdout(file),
-    )?;
-    Ok(list)
-}
-
-/// All tests, by nextest: each in a process, those that need the machine for themselves alone (`.config/nextest.toml`).
-fn tests(firmware: Option<&Path>, binaries: &Path, skips: &Skips) -> Result<(), Failure> {
-    step::run(
-        "tests",
-        prepared(&["nextest", "run"], firmware, skips)
-            .arg("--binaries-metadata")
-            .arg(binaries),
-    )?;
+/// All tests, by nextest where it is there: each in a process, those that need the machine for themselves alone
+/// (`.config/nextest.toml`). Plain cargo runs one test file after another; within one, the tests in QEMU wait for one another.
+fn tests(firmware: Option<&Path>, skips: &Skips) -> Result<(), Failure> {
+    if !step::succeeds(&mut cargo(&["nextest", "--version"])) {
+        println!("no cargo-nextest (cargo install cargo-nextest --locked): tests by cargo test");
+        let all = ["test", "--workspace", "--locked"];
+        return step::run("tests", &mut prepared(&all, firmware, skips));
+    }
+    let all = ["nextest", "run", "--workspace", "--locked"];
+    step::run("tests: build", cargo(&all).arg("--no-run"))?;
+    step::run("tests", &mut prepared(&all, firmware, skips))?;
     // nextest runs no examples of the documentation.
+    let examples = ["test", "--doc", "--workspace", "--locked"];
     step::run(
         "tests of the documentation",
-        &mut prepared(
-            &["test", "--doc", "--workspace", "--locked"],
-            firmware,
-            skips,
-        ),
+        &mut prepared(&examples, firmware, skips),
     )
 }
 
