@@ -94,12 +94,16 @@ fn bytes_that_find_the_queue_full_are_counted_and_the_bridge_goes_on() {
     let Some(firmware) = firmware() else { return };
     let _alone = alone();
     let sent = 6_000;
-    let Some([host, glove, gripper]) = (0..5).find_map(|_| flood(&firmware, sent)) else {
+    let mut tries = (0..5).filter_map(|_| flood(&firmware, sent)).peekable();
+    if tries.peek().is_none() {
         return skipped(
             Need::Machine,
             "the chip's loop stood for longer than its watchdog waits",
         );
-    };
+    }
+    // In a try without a loss the emulator had not delivered the bytes when the loop went on. A bridge that does not
+    // count loses none in every try.
+    let [host, glove, gripper] = tries.find(|[host, ..]| *host > 0).unwrap_or_default();
     println!("{sent} bytes to a bridge that takes none: {host} lost");
     // The queue holds 2,048. A machine with much to do may not have delivered all when the loop goes on; on one with
     // little to do the next host's first words still find the queue full.

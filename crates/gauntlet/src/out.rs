@@ -26,7 +26,7 @@ const LOOK: Duration = Duration::from_millis(50);
 /// Whether this process drove something: then its end does not wait for ever for a reader.
 static DROVE: AtomicBool = AtomicBool::new(false);
 
-/// One line to standard output. What goes wrong is kept for [`closed`] and [`check`].
+/// One line to standard output. What goes wrong is kept for [`reader_left`] and [`check`].
 pub fn line(text: Arguments<'_>) {
     STDERR.settle(SETTLE);
     STDOUT.push((harmless(text) + "\n").as_bytes());
@@ -56,9 +56,15 @@ pub fn bell() {
     STDOUT.push(b"\x07");
 }
 
-/// Whether standard output takes nothing any more: its reader left, or its disk is full.
-pub fn closed() -> bool {
-    STDOUT.fault().is_some()
+/// Whether standard output's reader left: a run that nobody sees had better end.
+///
+/// # Errors
+/// A failure where it takes nothing for another reason, such as a full disk.
+pub fn reader_left() -> Result<bool> {
+    match STDOUT.fault() {
+        Some(_) => check().map(|()| true),
+        None => Ok(false),
+    }
 }
 
 /// How long standard output has not taken what waits for it; zero where nothing waits.

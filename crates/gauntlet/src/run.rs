@@ -295,7 +295,7 @@ impl Run {
                 live.aside(|| suspend.stop()).or_fail(terminal, next)?;
             }
             // Nobody sees the lines any more: do not drive on unseen.
-            if self.interrupt.asked() || out::closed() {
+            if self.interrupt.asked() || out::reader_left()? {
                 return Ok(End::Asked);
             }
             let over = options

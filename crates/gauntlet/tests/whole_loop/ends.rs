@@ -2,7 +2,7 @@
 
 use crate::support;
 
-use std::io::Write;
+use std::io::{Read, Write};
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
@@ -119,6 +119,25 @@ fn a_full_pipe_holds_up_no_end() {
     bench.until_commanded(&mut running.0);
     let code = ends_soon(&mut running.0);
     assert_eq!(code, Some(1), "what it had to say was not taken");
+}
+
+#[test]
+fn a_full_disk_behind_standard_output_holds_and_is_told_as_the_cause() {
+    let bench = Bench::new(&["--engage", "--seconds", "60"]);
+    let full = std::fs::File::options()
+        .write(true)
+        .open("/dev/full")
+        .unwrap();
+    let mut command = command(&bench.arguments());
+    let mut running = Running::start(command.stdout(full).stderr(Stdio::piped()));
+    let mut stderr = running.0.stderr.take().unwrap();
+    let code = ends_soon(&mut running.0);
+    let mut said = String::new();
+    stderr.read_to_string(&mut said).unwrap();
+    assert_eq!(code, Some(1), "{said}");
+    let cause = "error: standard output took not all";
+    assert!(said.contains(cause), "{said}");
+    assert!(said.contains("No space left"), "{said}");
 }
 
 #[test]

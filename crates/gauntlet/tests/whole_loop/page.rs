@@ -7,7 +7,8 @@ use std::time::Duration;
 
 use gauntlet::web::picture::Headline;
 use gauntlet::web::{Page, Picture, Wish};
-use support::bench::{Bench, Running, ends_soon};
+use rustix::process::Signal;
+use support::bench::{Bench, Running, ends_soon, send};
 use support::page::{OpenPage, address, answer, parts};
 use support::{command, interrupt};
 
@@ -284,6 +285,34 @@ fn one_page_holds_the_clutch_and_closing_it_opens_the_clutch_which_nobody_else_h
         Some("the program has ended")
     );
     ends_soon(&mut running.0);
+}
+
+#[test]
+fn a_page_that_only_lies_open_is_nobody_who_could_close_the_clutch_again() {
+    for used in [false, true] {
+        let bench = Bench::new(&["--engage"]);
+        let (mut running, address) = run(&bench);
+        let mut page = OpenPage::open(&address);
+        bench.until_moving(&mut running.0);
+        page.until("closed by --engage", |page| page.clutch() == "closed");
+        // Neither changes anything, but a press says that somebody is there.
+        page.say(if used { "close" } else { "beat" });
+        let number = page.number;
+        page.until("some pictures later", |page| page.number > number + 5);
+        send(&running.0, Signal::STOP);
+        std::thread::sleep(Duration::from_millis(1_500));
+        send(&running.0, Signal::CONT);
+        page.until("opened for want of a heartbeat", |page| {
+            page.clutch() == "expired"
+        });
+        // The glove's frames are there again by then.
+        let number = page.number;
+        page.until("a second later", |page| page.number > number + 60);
+        interrupt(&running.0);
+        // Who was there knew of it; a run by itself did not do its work.
+        let code = if used { 0 } else { 1 };
+        assert_eq!(ends_soon(&mut running.0), Some(code), "used: {used}");
+    }
 }
 
 #[test]

@@ -122,7 +122,7 @@ impl Session {
         }
         loop {
             self.round(tell, drawn)?;
-            if interrupt.asked() || (!self.json && out::closed()) {
+            if interrupt.asked() || (!self.json && out::reader_left()?) {
                 return Ok(Led::Stopped);
             }
             let mut keys = live.keys().or_fail(terminal, next)?;

@@ -155,7 +155,7 @@ impl Watching {
             let over = options
                 .seconds
                 .is_some_and(|time| started.elapsed() >= time);
-            if over || interrupt.asked() || out::closed() {
+            if over || interrupt.asked() || out::reader_left()? {
                 return Ok(());
             }
             if !self.scanning.running() {

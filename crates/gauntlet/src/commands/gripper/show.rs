@@ -48,8 +48,12 @@ impl<B> Doing<'_, B> {
             .status(&mut self.driver, patience)
             .map_err(|_| {
                 if self.waiter.interrupt.asked() {
-                    let what =
-                        "interrupted after it was done, before the state could be read again";
+                    let what = match claim {
+                        Some(_) => {
+                            "interrupted after it was done, before the state could be read again"
+                        }
+                        None => "interrupted before the state could be read again",
+                    };
                     return Failure::new(what, self.target.again("status"));
                 }
                 Failure::new("the gripper stopped answering", self.target.doctor())

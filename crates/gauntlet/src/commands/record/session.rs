@@ -128,7 +128,8 @@ impl Session {
             let began = Instant::now();
             while began.elapsed() < prompt.time {
                 self.round(interrupt)?;
-                if interrupt.asked() || (!self.quiet && out::closed()) {
+                let unseen = !self.quiet && out::reader_left().map_err(Gone::Ended)?;
+                if interrupt.asked() || unseen {
                     return Ok(false);
                 }
                 let done = before + began.elapsed().min(prompt.time);

@@ -27,6 +27,8 @@ const ENDS: [f64; 2] = [0.05, 0.95];
 const STRONG: f32 = 70.0;
 /// The share of postures in which it must go each way.
 const SHARE: f32 = 0.2;
+/// A cause is steady where it goes the other way in at most this share of postures.
+const STEADY: f32 = 0.05;
 /// A finger is named for an axis beside the first from this share of the first's influence on.
 const BESIDE: f32 = 0.45;
 /// Below this, counts, a finger does nothing to an axis.
@@ -105,6 +107,9 @@ impl Influence {
     }
 
     /// Folds and twists: of each axis the worst.
+    ///
+    /// A finger that moves an axis either way is no twist where another cause moves it one way in more postures: the scissor
+    /// of every map heeds the fingers between a little, and follows their spread all the same.
     pub fn turned(&self) -> Vec<Turned> {
         let worst = |values: &[f32]| {
             let places = 0..values.len();
@@ -112,9 +117,15 @@ impl Influence {
         };
         let mut turned = Vec::new();
         for axis in 0..self.mean.len() {
-            let both: Vec<f32> = self.ways[axis]
+            let ways = &self.ways[axis];
+            let steady = ways.iter().filter(|[up, down]| up.min(*down) <= STEADY);
+            let steadiest = steady.map(|[up, down]| up.max(*down)).fold(0.0, f32::max);
+            let both: Vec<f32> = ways
                 .iter()
-                .map(|[up, down]| up.min(*down))
+                .map(|[up, down]| match up + down > steadiest {
+                    true => up.min(*down),
+                    false => 0.0,
+                })
                 .collect();
             // What twists also folds along another finger: the twist says more.
             if let Some(cause) = worst(&both).filter(|c| both[*c] > SHARE) {

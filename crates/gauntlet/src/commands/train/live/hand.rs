@@ -199,7 +199,7 @@ impl<'a> Worn<'a> {
                 free.take(&pose.angles, pose.at);
             }
             free.pass(self.now());
-            if interrupt.asked() || (!json && out::closed()) {
+            if interrupt.asked() || (!json && out::reader_left()?) {
                 return Err(Failure::interrupted("in the free motion: nothing was kept").into());
             }
             for key in live.keys().or_fail(terminal, next)? {

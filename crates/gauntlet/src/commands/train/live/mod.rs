@@ -70,7 +70,8 @@ pub(super) fn run(options: &Train, interrupt: &Interrupt) -> Result<()> {
     // What begins to be learned is ready before the first pose is asked.
     let learner = Learner::start(lessons)?;
     let shower = (options.worn.show_on.as_deref())
-        .map(|gripper| Shower::new(gripper, options.gripper_model));
+        .map(|gripper| Shower::new(gripper, options.gripper_model))
+        .transpose()?;
     let mut session = Session::new(worn, learner, &aim, rounds, &files, options.json)
         .on(shower)
         .on_page(on_page.clone());

@@ -119,7 +119,7 @@ impl<'a> Session<'a> {
                     self.say(format!("{left}; g: show poses again"), false, tell, drawn);
                 }
             }
-            if interrupt.asked() || (!self.json && out::closed()) {
+            if interrupt.asked() || (!self.json && out::reader_left()?) {
                 return Ok(Shown::Stopped);
             }
             for key in live.keys().or_fail(terminal, next)? {

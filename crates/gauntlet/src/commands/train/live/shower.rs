@@ -21,6 +21,8 @@ const LOOK: Duration = Duration::from_millis(10);
 /// A gripper that shows poses.
 #[derive(Debug)]
 pub(super) struct Shower {
+    /// The tool: this program.
+    tool: PathBuf,
     gripper: PathBuf,
     model: Model,
     moving: Option<Child>,
@@ -31,8 +33,15 @@ pub(super) struct Shower {
 }
 
 impl Shower {
-    pub fn new(gripper: &Path, model: Model) -> Self {
+    /// # Errors
+    /// This program's own path is not known.
+    pub fn new(gripper: &Path, model: Model) -> std::io::Result<Self> {
+        Ok(Self::by(std::env::current_exe()?, gripper, model))
+    }
+
+    fn by(tool: PathBuf, gripper: &Path, model: Model) -> Self {
         Self {
+            tool,
             gripper: gripper.to_owned(),
             model,
             moving: None,
@@ -119,7 +128,7 @@ impl Shower {
 
     fn begin(&self, counts: &[f32]) -> std::io::Result<Child> {
         let to: Vec<String> = counts.iter().map(|count| format!("{count:.0}")).collect();
-        Command::new(std::env::current_exe()?)
+        Command::new(&self.tool)
             .args(["gripper", "move", "--gripper"])
             .arg(&self.gripper)
             .args([
@@ -167,4 +176,39 @@ fn said(child: &mut Child) -> String {
     }
     let error = text.lines().find_map(|line| line.strip_prefix("error: "));
     error.unwrap_or("it says not why").to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Looks until the move has ended; what went wrong with it.
+    fn ended(shower: &mut Shower) -> Option<String> {
+        while shower.moving.is_some() {
+            if let Some(wrong) = shower.look() {
+                return Some(wrong);
+            }
+            std::thread::sleep(LOOK);
+        }
+        None
+    }
+
+    #[test]
+    fn after_a_move_that_went_wrong_none_begins_until_the_person_says_so() {
+        let mut shower = Shower::by("false".into(), Path::new("/dev/null"), Model::ThreeFinger);
+        shower.show(&[0.0; 4]);
+        assert_eq!(shower.look(), None);
+        let wrong = ended(&mut shower).expect("`false` fails");
+        assert!(wrong.ends_with("g: show poses again"), "{wrong}");
+        assert!(shower.is_halted());
+        for _ in 0..3 {
+            shower.show(&[255.0; 4]);
+            assert_eq!(shower.look(), None);
+            assert!(shower.moving.is_none(), "nobody said that it may");
+        }
+        shower.go_on();
+        shower.show(&[255.0; 4]);
+        assert_eq!(shower.look(), None);
+        assert!(shower.moving.is_some());
+    }
 }
