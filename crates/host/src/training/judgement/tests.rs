@@ -169,17 +169,17 @@ fn a_twist_is_named_with_its_axis_and_finger() {
 
 #[test]
 fn a_finger_beside_the_one_that_drives_an_axis_may_move_it_either_way() {
-    // The scissor follows the spread; the middle finger pushes it open or together, as the little finger is bent.
+    // The scissor follows the spread; the middle finger pushes it open or together, as the thumb lies.
     let mut units = GOOD.to_vec();
-    const BESIDE: [(usize, f32); 4] = [(10, 1.0), (13, 1.0), (20, -1.5), (23, -1.5)];
-    const AGAINST: [(usize, f32); 4] = [(10, -1.0), (13, -1.0), (20, 1.5), (23, 1.5)];
-    units.extend([(3, 40.0, &BESIDE[..], 0.0), (3, 40.0, &AGAINST[..], 0.0)]);
-    let alone = judged(&written(&units, BASE), &frames(), None);
+    const BESIDE: [(usize, f32); 3] = [(10, 1.0), (13, 1.0), (1, -10.0)];
+    const AGAINST: [(usize, f32); 3] = [(10, -1.0), (13, -1.0), (1, 10.0)];
+    units.extend([(3, 60.0, &BESIDE[..], -1.2), (3, 60.0, &AGAINST[..], 1.2)]);
+    let alone = judged(&written(&units, [0.0, 0.0, 0.0, 180.0]), &frames(), None);
     println!("{alone} {:?}", alone.influence);
     assert_eq!(kinds(&alone), [""; 0], "{alone}");
     // Without the spread nothing drives it steadily.
     units.remove(3);
-    let undriven = judged(&written(&units, [0.0, 0.0, 0.0, 130.0]), &frames(), None);
+    let undriven = judged(&written(&units, [0.0, 0.0, 0.0, 60.0]), &frames(), None);
     println!("{undriven}");
     assert!(kinds(&undriven).contains(&"twist"), "{undriven}");
 }
