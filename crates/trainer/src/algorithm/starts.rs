@@ -2,8 +2,8 @@
 //! lie, and no later step turns it over.
 //!
 //! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those go
-//! on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise: no truth is
-//! asked, no held-out sample looked at. [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out
+//! on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise; of those that
+//! come to the end the one most like the others is taken (of two the cheaper). No truth is asked, no held-out sample looked at. [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out
 //! depends on the seed alone, not on threads nor on how it was driven. One start is the training of Algorithm 1 to the bit.
 
 mod checkpoint;
@@ -12,6 +12,7 @@ mod runner;
 mod several;
 #[cfg(test)]
 mod tests;
+mod typical;
 mod usual;
 
 pub use cuts::Cut;
@@ -26,6 +27,7 @@ use crate::random::Random;
 use core::ops::ControlFlow;
 use core::time::Duration;
 use runner::{Runner, judging};
+use typical::{image, most_typical};
 
 /// Random numbers of the seeds of further starts.
 const SEED_STREAM: u64 = 0x5354_4152;
@@ -313,6 +315,14 @@ impl Starts {
                 .unwrap_or(f64::INFINITY)
                 .total_cmp(&b.cost.unwrap_or(f64::INFINITY))
         });
+        let finite = |runner: &&&mut Runner| runner.cost.is_some_and(f64::is_finite);
+        let finite = live.iter().take_while(finite).count();
+        if self.made + 1 == self.cuts.len() && finite > 2 {
+            let images: Vec<Vec<f32>> = (live[..finite].iter())
+                .map(|runner| image(&runner.trainer.networks().f, q))
+                .collect();
+            live.swap(0, most_typical(&images));
+        }
         for runner in live.into_iter().skip(cut.keep.max(1)) {
             runner.is_live = false;
         }

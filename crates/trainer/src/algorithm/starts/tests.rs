@@ -66,8 +66,8 @@ fn threads_and_pauses_change_no_bit_of_what_several_starts_bring() {
 }
 
 #[test]
-fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
-    let mut all = starts(13, 2);
+fn of_two_that_come_to_the_end_the_cheaper_is_taken_and_dear_ones_end_early() {
+    let mut all = starts(12, 2);
     train(&mut all, 50);
     let total = all.total();
     let fates = all.starts();
@@ -89,7 +89,42 @@ fn the_start_that_costs_least_is_taken_and_dear_ones_end_early() {
         .iter()
         .filter(|start| start.epochs == first.epoch)
         .count();
-    assert_eq!(dear, 13 - first.keep);
+    assert_eq!(dear, 12 - first.keep);
+}
+
+#[test]
+fn of_three_that_come_to_the_end_the_one_nearest_to_the_others_is_taken() {
+    let (q, _) = samples();
+    let mut seen = [false; 2];
+    for seed in 1..=6 {
+        let (_, x) = samples();
+        let settings = Settings {
+            seed,
+            ..settings(2)
+        };
+        let mut all = Starts::new((&q, &x), &settings, several(13)).unwrap();
+        let trained = train(&mut all, 50);
+        let fates = all.starts();
+        let whole: Vec<usize> = (0..13)
+            .filter(|number| fates[*number].epochs == all.total())
+            .collect();
+        assert_eq!(whole.len(), 3);
+        let far = |a: usize, b: usize| -> f64 {
+            let [a, b] = [a, b].map(|number| all.runners[number].trainer.trained().networks.f);
+            let square = |q: &[f32]| -> f64 {
+                let pairs = a.eval(q).into_iter().zip(b.eval(q));
+                pairs.map(|(a, b)| f64::from(a - b).powi(2)).sum()
+            };
+            q.iter_rows().map(square).sum::<f64>().sqrt()
+        };
+        let sum = |one: usize| whole.iter().map(|other| far(one, *other)).sum::<f64>();
+        let taken = fates.iter().position(|start| start.is_live).unwrap();
+        assert!(whole.iter().all(|other| sum(taken) <= sum(*other)));
+        assert_eq!(flat(&all.runners[taken].trainer.trained()), flat(&trained));
+        let cost = |number: usize| fates[number].cost.unwrap();
+        seen[usize::from(whole.iter().all(|other| cost(taken) <= cost(*other)))] = true;
+    }
+    assert!(seen[0], "never another than the cheapest");
 }
 
 /// The parts of Eq. 13 of a map over all samples, by the slow witness.
