@@ -141,21 +141,29 @@ fn a_file_that_is_there_is_never_written_over() {
     assert_eq!(std::fs::read_to_string(&path).unwrap(), "mine");
 }
 
-#[test]
-fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
-    let bench = Bench::new();
-    let arguments = bench.arguments("hand.csv", &["--ideal", "--seconds", "60", "--json"]);
+/// The tool in a shell in which no file grows longer than so many blocks of 512 bytes.
+fn limited(blocks: &str, arguments: Vec<String>) -> Child {
     let tool = command(&[]).get_program().to_str().unwrap().to_owned();
-    // In blocks of 512 bytes: more than what is tried before, and a few seconds of rows.
-    let limited = format!("ulimit -f 140; exec '{tool}' \"$@\"");
-    let child = std::process::Command::new("sh")
-        .args(["-c", &limited, "sh"])
+    std::process::Command::new("sh")
+        .args([
+            "-c",
+            &format!("ulimit -f {blocks}; exec '{tool}' \"$@\""),
+            "sh",
+        ])
         .args(arguments)
         .stdin(Stdio::null())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
+        .unwrap()
+}
+
+#[test]
+fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
+    let bench = Bench::new();
+    let arguments = bench.arguments("hand.csv", &["--ideal", "--seconds", "60", "--json"]);
+    // More than what is tried before, and a few seconds of rows.
+    let child = limited("140", arguments);
     let output = finish(child);
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
@@ -175,23 +183,11 @@ fn a_disk_that_takes_no_more_is_told_and_the_rows_it_took_are_kept() {
 fn a_recording_s_log_has_every_scan_and_one_that_finds_no_room_is_told_while_the_recording_goes_on()
 {
     let bench = Bench::new();
-    let tool = command(&[]).get_program().to_str().unwrap().to_owned();
     for (blocks, name) in [("unlimited", "whole"), ("600", "short")] {
         let [out, log] = ["csv", "mcap"].map(|end| format!("{name}.{end}"));
         let place = bench.file(&log).display().to_string();
         let more = ["--ideal", "--seconds", "6", "--json", "--log", &place];
-        let child = std::process::Command::new("sh")
-            .args([
-                "-c",
-                &format!("ulimit -f {blocks}; exec '{tool}' \"$@\""),
-                "sh",
-            ])
-            .args(bench.arguments(&out, &more))
-            .stdin(Stdio::null())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
+        let child = limited(blocks, bench.arguments(&out, &more));
         let output = finish(child);
         let said = text(&output.stderr);
         let rows = rows(&bench.file(&out)) as u64;

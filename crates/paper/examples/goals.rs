@@ -6,19 +6,19 @@
 
 #[path = "common/domain.rs"]
 mod domain;
+#[path = "common/several.rs"]
+mod several;
 
-use core::ops::ControlFlow;
 use core::sync::atomic::{AtomicUsize, Ordering};
 use domain::{Result, domain};
 use paper::stats::summary;
+use several::{several_starts, usual};
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
-use trainer::algorithm::starts::Usual;
-use trainer::algorithm::{InUnits, Schedule, Settings, Starts};
-use trainer::measures::measure;
+use trainer::algorithm::{Schedule, Settings};
 
 /// Columns of a data set's file.
 const HEAD: &str = "seed,d,vo,dknn,nmse,cost,taken,seconds";
@@ -82,7 +82,7 @@ fn goals(name: &str) -> Vec<Goal> {
             at_least(vo, Of::Median, 0.965),
             at_most(d, Of::Median, 5.28),
         ],
-        "hand" => vec![
+        "hand" | "same-hand" => vec![
             at_least(vo, Of::Least, 0.965),
             at_most(dknn, Of::Most, 12.0),
             at_most(d, Of::Median, 5.05),
@@ -99,10 +99,7 @@ fn goals(name: &str) -> Vec<Goal> {
 /// One map, as a line of the file.
 fn line(data: &str, seed: u64) -> Result<String> {
     let mut domain = domain(data, seed)?;
-    let usual = match domain.truth {
-        Some(_) => Usual::of_target(domain.targets.cols),
-        None => Usual::HAND,
-    };
+    let usual = usual(&domain);
     let plan = usual.plan(Schedule::Fast.plan_for(domain.targets.cols));
     let settings = Settings {
         schedule: Schedule::Custom(plan),
@@ -111,20 +108,8 @@ fn line(data: &str, seed: u64) -> Result<String> {
         ..domain.settings.clone()
     };
     let begin = Instant::now();
-    let samples = (&domain.train, &domain.targets);
-    let mut starts = Starts::new(samples, &settings, usual.several(usual.count))?;
-    let mut operator = InUnits {
-        operator: domain.operator.as_mut(),
-        input: &domain.units.0,
-        target: &domain.units.1,
-    };
-    let go_on = &mut |_: &mut Starts| ControlFlow::Continue(());
-    let trained = starts
-        .train_with(&mut operator, 10, go_on)?
-        .ok_or("stopped")?;
+    let (m, fates) = several_starts(&mut domain, &settings, usual.several(usual.count))?;
     let seconds = begin.elapsed().as_secs_f64();
-    let m = measure(&trained.networks.f, &domain.test());
-    let fates = starts.starts();
     let taken = fates.iter().position(|start| start.is_live).unwrap_or(0);
     Ok(format!(
         "{seed},{:.4},{:.4},{:.4},{:.4},{:.5},{taken},{seconds:.2}",
@@ -210,7 +195,7 @@ fn main() -> Result<()> {
     let folder = Path::new(words.first().ok_or("FOLDER [SEEDS [RECORDING.csv]]")?);
     let usual: u64 = words.get(1).map_or(Ok(30), |word| word.parse())?;
     std::fs::create_dir_all(folder)?;
-    let mut sets = vec!["sp2", "sp3", "hand", "sp4", "sp1"];
+    let mut sets = vec!["sp2", "sp3", "same-hand", "sp4", "sp1", "hand"];
     sets.extend(words.get(2).map(String::as_str));
     println!("| data | seeds | of all seeds | goal | found | holds |\n|---|---|---|---|---|---|");
     for data in sets {

@@ -13,13 +13,14 @@
 
 #[path = "common/domain.rs"]
 mod domain;
+#[path = "common/several.rs"]
+mod several;
 
-use core::ops::ControlFlow;
 use domain::{Domain, Result, domain};
+use several::{several_starts, usual};
 use std::time::Instant;
-use trainer::algorithm::starts::Usual;
 use trainer::algorithm::{
-    Advance, InUnits, PairPlan, Plan, Schedule, Settings, Starts, Trainer, start_seed,
+    Advance, InUnits, PairPlan, Plan, Schedule, Settings, Trainer, start_seed,
 };
 use trainer::cost::fast::evaluate;
 use trainer::data::Pairs;
@@ -213,29 +214,12 @@ fn best(
     if mode == Mode::Taught {
         settings.pairs = PairPlan::Fixed(taught(domain, &settings)?);
     }
-    let usual = match domain.truth {
-        Some(_) => Usual::of_target(domain.targets.cols),
-        None => Usual::HAND,
-    };
-    let mut starts = Starts::new(
-        (&domain.train, &domain.targets),
-        &settings,
-        usual.several(count),
-    )?;
-    let mut operator = InUnits {
-        operator: domain.operator.as_mut(),
-        input: &domain.units.0,
-        target: &domain.units.1,
-    };
-    let go_on = &mut |_: &mut Starts| ControlFlow::Continue(());
-    let trained = starts
-        .train_with(&mut operator, 10, go_on)?
-        .ok_or("stopped")?;
-    let m = measure(&trained.networks.f, &domain.test());
-    let costs: Vec<String> = (starts.starts().iter())
+    let several = usual(domain).several(count);
+    let (m, fates) = several_starts(domain, &settings, several)?;
+    let costs: Vec<String> = (fates.iter())
         .map(|start| format!("{}:{:.5}", start.epochs, start.cost.unwrap_or(f64::NAN)))
         .collect();
-    let taken = starts.starts().iter().position(|start| start.is_live);
+    let taken = fates.iter().position(|start| start.is_live);
     println!(
         "{label},{},{:.4},{:.4},{:.4},{:.4},{:.2},{}",
         taken.unwrap_or(count),

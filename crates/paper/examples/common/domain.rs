@@ -57,14 +57,20 @@ fn shape(pair: ShapePair, seed: u64) -> Result<Domain> {
     })
 }
 
-fn hand(space: Space, recording: Option<&str>, seed: u64) -> Result<Domain> {
+/// Whose motion.
+enum Motion<'a> {
+    Generated(u64),
+    Recorded(&'a str),
+}
+
+fn hand(space: Space, motion: &Motion<'_>, seed: u64) -> Result<Domain> {
     let limits = &glove::hand::LIMITS;
-    let (frames, mut operator) = match recording {
-        None => (
-            Generator::new(limits, seed).frames(635, 9.2),
+    let (frames, mut operator) = match motion {
+        Motion::Generated(of) => (
+            Generator::new(limits, *of).frames(635, 9.2),
             Scripted::new(space, limits),
         ),
-        Some(path) => {
+        Motion::Recorded(path) => {
             let frames = trainer::data::read_poses(path, &glove::hand::JOINT_NAMES)?.rows;
             let operator = Scripted::for_recording(space, &frames)?;
             (frames, operator)
@@ -113,15 +119,17 @@ fn network_units(coverage: Coverage, units: &Normalisation) -> Coverage {
     }
 }
 
-/// The data set of this name (sp1 to sp4, hand, hand-1, or the path of a recording) with its split.
+/// The data set of this name (sp1 to sp4, hand, hand-1, same-hand, or the path of a recording) with its split. Each seed of `hand` has a
+/// motion of its own, those of `same-hand` have one.
 pub(crate) fn domain(name: &str, seed: u64) -> Result<Domain> {
     match name {
         "sp1" => shape(ShapePair::Sp1, seed),
         "sp2" => shape(ShapePair::Sp2, seed),
         "sp3" => shape(ShapePair::Sp3, seed),
         "sp4" => shape(ShapePair::Sp4, seed),
-        "hand-1" => hand(Space::OneAxis, None, seed),
-        "hand" => hand(Space::ThreeFinger, None, seed),
-        path => hand(Space::ThreeFinger, Some(path), seed),
+        "hand-1" => hand(Space::OneAxis, &Motion::Generated(seed), seed),
+        "hand" => hand(Space::ThreeFinger, &Motion::Generated(seed), seed),
+        "same-hand" => hand(Space::ThreeFinger, &Motion::Generated(1), seed),
+        path => hand(Space::ThreeFinger, &Motion::Recorded(path), seed),
     }
 }

@@ -23,7 +23,7 @@ pub(super) fn describe(options: &Train, task: &Task, course: &Course, tell: &Tel
     let starts = task.starts(course);
     if starts > 1 {
         tell.say(format_args!(
-            "starts     {starts}; those that cost most end early, the cheapest on the training samples is taken"
+            "starts     {starts}; those that cost most on the training samples end early; of the others the one most like them is taken, of two the cheaper"
         ));
     }
     if options
