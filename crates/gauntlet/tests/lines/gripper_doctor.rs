@@ -129,6 +129,31 @@ fn another_unit_is_found() {
 }
 
 #[test]
+fn what_is_to_be_typed_for_another_unit_names_the_gripper_that_answers() {
+    for (family, asked, other) in [
+        (Family::ThreeFinger, "2f85", "--gripper-model 2f85"),
+        (Family::HandE, "3f", "--gripper-model 3f"),
+    ] {
+        let (_gripper, _handle, path) = gripper(Config::of(family));
+        let output = run(&[
+            "doctor",
+            "--gripper",
+            &path,
+            "--unit",
+            "5",
+            "--gripper-model",
+            asked,
+            "--json",
+        ]);
+        let said = serde_json::from_slice(&output.stdout).unwrap();
+        let wrong = wrongs(&said);
+        contains(&wrong[0], &["unit 9 answers", "gauntlet gripper status"]);
+        assert!(!wrong[0].contains(other), "{}", wrong[0]);
+        assert_eq!(wrong.len(), 2, "unit and kind: {wrong:#?}");
+    }
+}
+
+#[test]
 fn another_baud_is_found() {
     let config = Config {
         baud: 19_200,

@@ -18,6 +18,7 @@ use crate::clock::Clock;
 use crate::failure::Failure;
 use crate::interrupt::Interrupt;
 use crate::lines::Line;
+use crate::lines::Model;
 use crate::lines::Pc;
 use crate::lines::port::{BAUD, Port};
 use crate::lines::{list, tcp};
@@ -77,7 +78,7 @@ fn serial(place: &Place<'_>, thorough: bool, findings: &mut Findings, interrupt:
         findings.good("line", what);
         let needed = tally.tell(place, findings);
         let place = needed.map_or(*place, |needed| place.with_patience(needed));
-        return talk(port, &place, findings, interrupt);
+        return talk(port, &place, place.asked.model, findings, interrupt);
     }
     drop(port);
     unanswered(place, &tally, thorough, findings, interrupt);
@@ -173,7 +174,11 @@ fn spoiled(place: &Place<'_>, came: &Came, findings: &mut Findings) {
 fn elsewhere(place: &Place<'_>, found: Found, findings: &mut Findings, interrupt: &Interrupt) {
     let Found { baud, unit } = found;
     let (asked_baud, asked_unit) = (place.baud(), place.unit());
-    let there = place.with_baud(baud).with_unit(unit);
+    let mut there = place.with_baud(baud).with_unit(unit);
+    let mut port = Port::open(place.path, baud);
+    if let Ok(port) = &mut port {
+        there = there.with_kind(kind(port, &there, interrupt));
+    }
     let next = there.command("gripper status").then(format!(
         ", or set unit {asked_unit} and {asked_baud} baud in the maker's tool"
     ));
@@ -185,12 +190,12 @@ fn elsewhere(place: &Place<'_>, found: Found, findings: &mut Findings, interrupt
         let what = format!("unit {unit} answers at {baud} baud, not unit {asked_unit}");
         findings.wrong("unit", what, next);
     }
-    match Port::open(place.path, baud) {
+    match port {
         Ok(mut port) => {
             let tally = exchanges(&mut port, unit, baud, interrupt);
             let needed = tally.tell(&there, findings);
             let there = needed.map_or(there, |needed| there.with_patience(needed));
-            talk(port, &there, findings, interrupt);
+            talk(port, &there, place.asked.model, findings, interrupt);
         }
         Err(error) => findings.failure("port", &Failure::from(error)),
     }
@@ -266,20 +271,30 @@ fn sample_of(bytes: &[u8]) -> String {
     }
 }
 
-/// Somebody answers: which gripper is it, and what does it say?
-fn talk(mut port: Port, place: &Place<'_>, findings: &mut Findings, interrupt: &Interrupt) {
-    let (unit, baud) = (place.unit(), place.baud());
+/// Which kind of gripper answers.
+fn kind(port: &mut Port, place: &Place<'_>, interrupt: &Interrupt) -> Kind {
     let wait = WAIT.max(place.patience());
     // Only the 3-Finger has eight status registers.
     let three = (0..TRIES).any(|_| {
-        let (came, _) = exchange(&mut port, unit, baud, 8, wait, interrupt);
+        let (came, _) = exchange(port, place.unit(), place.baud(), 8, wait, interrupt);
         matches!(came, Came::Answer(_))
     });
-    let kind = if three {
+    if three {
         Kind::ThreeFinger
     } else {
         Kind::TwoFinger
-    };
+    }
+}
+
+/// Somebody answers: which gripper is it, is it the one that was asked for, and what does it say?
+fn talk(
+    mut port: Port,
+    place: &Place<'_>,
+    asked: Option<Model>,
+    findings: &mut Findings,
+    interrupt: &Interrupt,
+) {
+    let kind = kind(&mut port, place, interrupt);
     let config = gripper::driver::Config {
         check_family: false,
         ..Line::serial_config(place.asked.settings)
@@ -287,7 +302,7 @@ fn talk(mut port: Port, place: &Place<'_>, findings: &mut Findings, interrupt: &
     let watch = port.watch();
     let mut pc = Pc::new(Clock::start(), [watch], interrupt.clone());
     let there = place.with_kind(kind);
-    if three {
+    if kind == Kind::ThreeFinger {
         let mut driver = ThreeFinger::new(port, config);
         let sampled = sample(&mut driver, &mut pc, interrupt);
         told(&sampled, kind, &there, findings);
@@ -298,7 +313,7 @@ fn talk(mut port: Port, place: &Place<'_>, findings: &mut Findings, interrupt: &
         let sampled = sample(&mut driver, &mut pc, interrupt);
         told(&sampled, kind, &there, findings);
     }
-    if let Some(model) = place.asked.model.filter(|model| kind_of(*model) != kind) {
+    if let Some(model) = asked.filter(|model| kind_of(*model) != kind) {
         let what = format!("a {} answers, not a {}", kind.name(), model.name());
         let next = match kind {
             Kind::ThreeFinger => "--gripper-model 3f, or nothing: it is the usual one",
