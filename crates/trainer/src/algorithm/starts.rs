@@ -3,7 +3,7 @@
 //!
 //! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those go
 //! on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise; of those that
-//! come to the end the one most like the others is taken (of two the cheaper). No truth is asked, no held-out sample looked at. [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out
+//! come to the end as cheap as the cheapest, or nearly, the one most like the others is taken (of two the cheaper). No truth is asked, no held-out sample looked at. [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out
 //! depends on the seed alone, not on threads nor on how it was driven. One start is the training of Algorithm 1 to the bit.
 
 mod checkpoint;
@@ -31,6 +31,10 @@ use typical::{image, most_typical};
 
 /// Random numbers of the seeds of further starts.
 const SEED_STREAM: u64 = 0x5354_4152;
+
+/// A map that costs more than so many times the cheapest is of another kind: good and poor ones lie a tenth and more apart
+/// (docs/measurements/sp2-sp3.md).
+const CHEAP: f64 = 1.1;
 
 /// The seed of start `number`, from 0, of a training with this seed: the first has the training's own.
 #[must_use]
@@ -315,10 +319,11 @@ impl Starts {
                 .unwrap_or(f64::INFINITY)
                 .total_cmp(&b.cost.unwrap_or(f64::INFINITY))
         });
-        let finite = |runner: &&&mut Runner| runner.cost.is_some_and(f64::is_finite);
-        let finite = live.iter().take_while(finite).count();
-        if self.made + 1 == self.cuts.len() && finite > 2 {
-            let images: Vec<Vec<f32>> = (live[..finite].iter())
+        if self.made + 1 == self.cuts.len() {
+            let cheapest = live.first().and_then(|runner| runner.cost);
+            let bound = cheapest.unwrap_or(f64::INFINITY) * CHEAP;
+            let cheap = |runner: &&&mut Runner| runner.cost.is_some_and(|cost| cost <= bound);
+            let images: Vec<Vec<f32>> = (live.iter().take_while(cheap))
                 .map(|runner| image(&runner.trainer.networks().f, q))
                 .collect();
             live.swap(0, most_typical(&images));

@@ -93,22 +93,29 @@ fn of_two_that_come_to_the_end_the_cheaper_is_taken_and_dear_ones_end_early() {
 }
 
 #[test]
-fn of_three_that_come_to_the_end_the_one_nearest_to_the_others_is_taken() {
+fn of_those_as_cheap_as_the_cheapest_or_nearly_the_one_nearest_to_the_others_is_taken() {
     let (q, _) = samples();
-    let mut seen = [false; 2];
-    for seed in 1..=6 {
+    let (mut not_the_cheapest, mut too_dear) = (0, 0);
+    for seed in 1..=8 {
         let (_, x) = samples();
         let settings = Settings {
             seed,
             ..settings(2)
         };
-        let mut all = Starts::new((&q, &x), &settings, several(13)).unwrap();
+        let mut all = Starts::new((&q, &x), &settings, several(25)).unwrap();
         let trained = train(&mut all, 50);
         let fates = all.starts();
-        let whole: Vec<usize> = (0..13)
+        let cost = |number: usize| fates[number].cost.unwrap();
+        let whole: Vec<usize> = (0..25)
             .filter(|number| fates[*number].epochs == all.total())
             .collect();
-        assert_eq!(whole.len(), 3);
+        let least = whole
+            .iter()
+            .map(|number| cost(*number))
+            .fold(f64::INFINITY, f64::min);
+        let (near, dear): (Vec<usize>, Vec<usize>) =
+            (whole.iter()).partition(|number| cost(**number) <= 1.1 * least);
+        too_dear += dear.len();
         let far = |a: usize, b: usize| -> f64 {
             let [a, b] = [a, b].map(|number| all.runners[number].trainer.trained().networks.f);
             let square = |q: &[f32]| -> f64 {
@@ -117,14 +124,15 @@ fn of_three_that_come_to_the_end_the_one_nearest_to_the_others_is_taken() {
             };
             q.iter_rows().map(square).sum::<f64>().sqrt()
         };
-        let sum = |one: usize| whole.iter().map(|other| far(one, *other)).sum::<f64>();
+        let sum = |one: usize| near.iter().map(|other| far(one, *other)).sum::<f64>();
         let taken = fates.iter().position(|start| start.is_live).unwrap();
-        assert!(whole.iter().all(|other| sum(taken) <= sum(*other)));
+        assert!(near.contains(&taken));
+        assert!(near.iter().all(|other| sum(taken) <= sum(*other)));
         assert_eq!(flat(&all.runners[taken].trainer.trained()), flat(&trained));
-        let cost = |number: usize| fates[number].cost.unwrap();
-        seen[usize::from(whole.iter().all(|other| cost(taken) <= cost(*other)))] = true;
+        not_the_cheapest += usize::from(near.len() > 2 && cost(taken) > least);
     }
-    assert!(seen[0], "never another than the cheapest");
+    println!("{not_the_cheapest} of 8 not the cheapest, {too_dear} too dear");
+    assert!(not_the_cheapest > 0 && too_dear > 0);
 }
 
 /// The parts of Eq. 13 of a map over all samples, by the slow witness.
