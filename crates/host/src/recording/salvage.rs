@@ -197,6 +197,7 @@ impl<'f, 'e> Reading<'f, 'e> {
             _ if is_proved(self.file, &body) => {
                 Err("a chunk that says it is something else".to_owned())
             }
+            _ if !self.goes_on(next) => Err("a record that leads nowhere".to_owned()),
             // This program writes none.
             op::ATTACHMENT | op::METADATA => Ok(()),
             _ => {
@@ -217,6 +218,20 @@ impl<'f, 'e> Reading<'f, 'e> {
             }
             Err(what) => self.lost(offset, &what),
         }
+    }
+
+    /// Whether something that can be read is at `offset`: only then the length of what is not looked into may be believed.
+    fn goes_on(&self, offset: usize) -> bool {
+        let next = framed(self.file, offset);
+        let is_known = next.is_some_and(|(code, body)| match code {
+            op::CHUNK => is_proved(self.file, &body),
+            op::ATTACHMENT | op::METADATA | op::DATA_END => true,
+            _ => self
+                .file
+                .get(body)
+                .is_some_and(|bytes| parsed(code, bytes).is_some()),
+        });
+        offset == self.file.len() || is_known
     }
 
     /// Nothing can be read at `offset`; where it can again.
