@@ -250,7 +250,8 @@ fn filled(bench: &mut Bench, number: usize, full: Full) -> Option<(Duration, usi
     // It drives on.
     assert!(
         !bench.stands_for(Duration::from_secs(4)),
-        "{full:?}: nothing is commanded any more"
+        "{full:?}: nothing is commanded any more: {}",
+        said.so_far()
     );
     interrupt(&running.0);
     let output = std::process::Output {

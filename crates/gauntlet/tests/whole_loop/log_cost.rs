@@ -164,7 +164,9 @@ fn a_page_of_sixty_pictures_a_second_makes_the_steps_of_the_loop_no_later() {
 /// What is in a log each second does not hang on the machine: fewer frames on a busy one, never more.
 #[test]
 fn a_minute_of_log_takes_fifteen_megabytes_at_most() {
-    let bench = Bench::new(&["--engage", "--json", "--seconds", "8"]);
+    let baud = ["--glove-baud", "115200"];
+    let more = ["--engage", "--json", "--seconds", "8"];
+    let bench = Bench::new(&[&baud[..], &more].concat());
     let mut running = Running::start(
         tool(&bench.arguments())
             .stdout(Stdio::piped())
@@ -187,6 +189,7 @@ fn a_minute_of_log_takes_fifteen_megabytes_at_most() {
         a_minute / 1e6,
         result["run"]["glove_frames_per_s"]
     );
+    assert_eq!(result["glove_baud"], 115_200, "{result}");
     assert!(a_minute <= A_MINUTE, "{a_minute:.0} bytes a minute");
     // And it is one of a run that did something.
     assert!(
