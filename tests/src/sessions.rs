@@ -1,109 +1,44 @@
 //! Seeded sessions of a PC's bridge on the virtual clock, with faults of the lines and devices and a person who engages, lets go and
-//! changes settings: written into a log and replayed from it.
+//! changes settings: written into a log, at their end or while they go on, and replayed from it.
+
+mod world;
 
 use std::path::Path;
 use std::time::{Duration as WallTime, Instant as WallClock};
 
-use bridge::trace::{Entry, GLOVE, GRIPPER, Look, Note, Order, Tapped, configuration};
-use bridge::{App, Board, Config, Instant, Platform, SafeAction, Settings, State, WeightsStore};
-use embedded_io::{ErrorType, Read, ReadReady, Write};
-use glove::sc18im::{BaudRefused, Sc18im, SetBaud};
+use bridge::trace::{Entry, GLOVE, GRIPPER, Look, Note as _, Tapped};
+use bridge::{App, Config, Platform, Settings, State, Telemetry, WeightsStore};
 use glove::scan::{self, Scanner};
 use gripper::driver::ThreeFinger;
 use host::recording::traced::Traced;
-use host::recording::{Drawn, SessionLog};
+use host::recording::{Drawn, QUEUE, SessionLog, Written, salvage};
 use host::replay::{self, Same};
-use host::session::record::queue;
+use host::session::record::{Command, Feed, Frame, Record, Records, Sort, queue};
 use host::trace::{Home, TraceLog};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rig::faulty::{Control, Faults, Faulty};
+use rig::faulty::{Faults, Faulty};
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
 
 use crate::images;
 use crate::nor_slot::NorSlot;
+pub use world::Acts;
+use world::{Machine, Wire, World};
 
 const AXES: usize = 4;
 const BAUD: u32 = 115_200;
-/// A step of the loop costs so much at least and at most, µs.
-const STEP: std::ops::Range<u64> = 20..400;
 /// The gripper is up and the glove was calibrated by then, µs.
 const READY: u64 = 12_000_000;
-/// Between two things that happen, µs.
-const EVENTS: std::ops::Range<u64> = 200_000..1_500_000;
-const BEAT: u64 = 100_000;
 
-/// A line that may be cut, lose bytes and change its speed.
-struct Wire {
-    faulty: Faulty<MemoryWire>,
-    wire: MemoryWire,
-}
-
-impl ErrorType for Wire {
-    type Error = <Faulty<MemoryWire> as ErrorType>::Error;
-}
-
-impl ReadReady for Wire {
-    fn read_ready(&mut self) -> Result<bool, Self::Error> {
-        self.faulty.read_ready()
-    }
-}
-
-impl Read for Wire {
-    fn read(&mut self, buffer: &mut [u8]) -> Result<usize, Self::Error> {
-        self.faulty.read(buffer)
-    }
-}
-
-impl Write for Wire {
-    fn write(&mut self, bytes: &[u8]) -> Result<usize, Self::Error> {
-        self.faulty.write(bytes)
-    }
-
-    fn flush(&mut self) -> Result<(), Self::Error> {
-        self.faulty.flush()
-    }
-}
-
-impl SetBaud for Wire {
-    fn set_baud(&mut self, baud: u32) -> Result<(), BaudRefused> {
-        self.wire.clone().set_baud(baud);
-        Ok(())
-    }
-}
-
-/// The virtual clock, on which each reading of it and each step takes its time.
-struct Machine {
-    clock: Clock,
-    random: ChaCha8Rng,
-    trace: TraceLog,
-}
-
-impl Platform for Machine {
-    fn now(&mut self) -> Instant {
-        let now = self.clock.now();
-        self.trace.clock(now);
-        now
-    }
-
-    fn wait_until(&mut self, due: Instant) {
-        self.trace.waited();
-        let cost = self.random.random_range(STEP);
-        self.clock.advance(rig::Duration::from_micros(cost));
-        if due > self.clock.now() {
-            // Bytes that come wake it, as on a PC.
-            let next = self.clock.next_event().unwrap_or(due);
-            self.clock.wait_until(due.min(next));
-        }
-    }
-}
-
-impl Board<AXES> for Machine {
-    type Glove = Sc18im<Tapped<Wire, TraceLog>>;
-    type Gripper = ThreeFinger<Tapped<Wire, TraceLog>>;
-    type Flash = NorSlot;
+/// When the log of a session is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Log {
+    /// Its trace, once it is over.
+    After,
+    /// While it goes on, from when its gripper is up, by the thread that writes a run's log: trace and decoded channels.
+    Live,
 }
 
 /// How a seeded session and its replay went.
@@ -117,6 +52,8 @@ pub struct Replayed {
     pub bytes: u64,
     /// Faults and acts of the person.
     pub events: u32,
+    /// Some of them.
+    pub acts: Acts,
     /// Frames that the gripper followed.
     pub followed: u32,
     /// How often it was held or faulted.
@@ -125,103 +62,79 @@ pub struct Replayed {
     pub last: State,
 }
 
-/// What happens from outside.
-struct World {
-    random: ChaCha8Rng,
-    glove: VirtualGlove,
-    gripper: VirtualGripper,
-    lines: [Control; 2],
-    wires: [MemoryWire; 2],
-    /// When what was broken is mended.
-    mend: Option<u64>,
-    due: u64,
-    beat: Option<u64>,
-    calibrate: u64,
-    activated: bool,
-    events: u32,
-    epoch: u32,
+/// What a session tells its log's writer beside the trace, and what it told.
+struct Telling {
+    feed: Feed,
+    seen: [u32; 3],
+    frames: u64,
+    commands: u64,
 }
 
-impl World {
-    fn tell(&mut self, now: u64, app: &mut App<Machine, AXES>, trace: &TraceLog) {
-        let mut give = |order: Order<'_>| trace.give(&order, app);
-        if self.mend.is_some_and(|mend| now >= mend) {
-            self.mend = None;
-            // A gripper that was off must be activated again.
-            self.activated = false;
-            self.lines.iter().for_each(|line| line.cut(false));
-            self.wires.iter().for_each(|wire| wire.unplug(false));
-            self.gripper.power(true);
-            (0..16).for_each(|sensor| self.glove.unplug(sensor, false));
+impl Telling {
+    fn tell(&mut self, app: &mut App<Machine, AXES>) {
+        let telemetry: Telemetry<AXES> = *app.telemetry();
+        let seen = [
+            telemetry.frame_sequence,
+            telemetry.sent_sequence,
+            telemetry.status_sequence,
+        ];
+        let is_new: [bool; 3] = core::array::from_fn(|k| seen[k] != self.seen[k]);
+        self.seen = seen;
+        if let Some(frame) = telemetry.frame.filter(|_| is_new[0]) {
+            self.frames += 1;
+            let hand = (telemetry.angles, telemetry.held_joints);
+            let hand = telemetry.angles_valid.then_some(hand);
+            let frame = Frame::of_scan(telemetry.now, &frame, hand, None);
+            self.feed.hand(Record::Frame(Box::new(frame)));
         }
-        if !self.activated && now > 3_000_000 {
-            self.activated = true;
-            give(Order::Activate);
+        if let Some(sent) = telemetry.sent.filter(|_| is_new[1]) {
+            self.commands += 1;
+            self.feed.hand(Record::Command(Command {
+                at: sent.at,
+                motion: sent.motion.into(),
+                age_us: None,
+                first: false,
+            }));
         }
-        if now >= self.calibrate && now < READY {
-            self.calibrate = now + 2_100_000;
-            give(Order::CalibrateStraight(2_000_000));
+        if let Some(status) = telemetry.status.filter(|_| is_new[2]) {
+            self.feed.hand(Record::Status(status.into()));
         }
-        if self.beat.is_some_and(|beat| now >= beat) {
-            self.beat = Some(now + BEAT);
-            give(Order::Heartbeat(self.epoch));
+        while let Some(event) = app.next_event() {
+            self.feed.hand(Record::Event {
+                at: event.at,
+                sort: Sort::Note,
+                text: format!("{:?}", event.kind),
+                kind: event.kind,
+            });
         }
-        if now < self.due.max(READY) {
-            return;
-        }
-        self.due = now + self.random.random_range(EVENTS);
-        self.events += 1;
-        let line = self.random.random_range(0..2);
-        let sensor = self.random.random_range(0..16);
-        let until = Some(now + self.random.random_range(20_000..600_000));
-        match self.random.random_range(0..16) {
-            0..=5 => {
-                // A person closes the clutch anew, after letting go where it was held.
-                give(Order::Release);
-                if let Some(epoch) = give(Order::Engage) {
-                    self.epoch = epoch;
-                }
-                self.beat = Some(now + BEAT);
-            }
-            6 => {
-                give(Order::Release);
-                self.beat = None;
-            }
-            7 => self.beat = None,
-            8 => {
-                give(Order::Release);
-                self.beat = None;
-                let settings = Settings::<AXES> {
-                    rate: self.random.random_range(50.0..1_000.0),
-                    speed: [self.random.random(); AXES],
-                    safe_action: [SafeAction::Hold, SafeAction::OpenSlowly][line],
-                    ..Settings::default()
-                };
-                give(Order::Settings(&configuration(&settings)));
-            }
-            9 => (self.lines[line].cut(true), self.mend = until).0,
-            10 => (self.wires[line].unplug(true), self.mend = until).0,
-            11 => (self.gripper.power(false), self.mend = until).0,
-            12 => self
-                .glove
-                .reset_sensor(sensor, rig::Instant::from_ticks(now)),
-            13 => (self.glove.unplug(sensor, true), self.mend = until).0,
-            14 => self.activated = false,
-            _ => {
-                give(Order::FindFlat(line == 0));
-                give(Order::CalibrateStraight(2_000_000));
-                give(Order::UndoCalibration);
-            }
+    }
+
+    /// That the log has all that was told, and nothing is wrong with it.
+    fn check(&self, path: &Path, written: &Written, log: Log) {
+        let file = std::fs::read(path).expect("a log");
+        let (mut frames, mut commands) = (0, 0);
+        let count = |message: salvage::Message<'_>| match message.channel.topic.as_str() {
+            "/glove/imu" => frames += 1,
+            "/gripper/command" => commands += 1,
+            _ => {}
+        };
+        let found = salvage::read(&file, count).expect("a log");
+        assert_eq!((found.finished, &found.damage[..]), (true, &[][..]));
+        assert_eq!((found.messages, written.lost), (written.messages, 0));
+        if log == Log::Live {
+            assert_eq!((frames, commands), (self.frames, self.commands));
         }
     }
 }
 
-/// A session of so many seconds written to a log at `path`, which is then replayed.
-///
-/// # Panics
-/// A log that cannot be written or read.
-pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
-    let image = images::gentle(seed);
+/// The log at `path` that a thread of its own writes from here on.
+fn written(path: &Path, records: Records) -> SessionLog {
+    let clock = host::clock::Clock::start();
+    SessionLog::create(path, Drawn::USUAL, clock, records).expect("a log")
+}
+
+/// The rig of a session: its virtual clock, what happens, and the bridge, whose trace has begun.
+fn bench(seed: u64, image: &[u8], trace: &TraceLog) -> (Clock, World, App<Machine, AXES>) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let clock = Clock::new();
     let hand = |time_s: f64| -> crate::bits::Pose {
@@ -237,8 +150,6 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
         flip: 2e-5,
         ..Faults::default()
     };
-    let (feed, records) = queue(16);
-    let trace = feed.trace();
     let wires = [
         MemoryWire::new(&clock, glove.clone(), BAUD),
         MemoryWire::new(&clock, gripper.clone(), BAUD),
@@ -248,20 +159,8 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
         let faulty = Faulty::new(wire.clone(), &clock, seed ^ u64::from(port), faults, faults);
         Wire { faulty, wire }
     });
-    let mut world = World {
-        random: ChaCha8Rng::seed_from_u64(!seed),
-        glove,
-        gripper,
-        lines: [glove_line.faulty.control(), gripper_line.faulty.control()],
-        wires,
-        mend: None,
-        due: 0,
-        beat: None,
-        calibrate: 6_000_000,
-        activated: false,
-        events: 0,
-        epoch: 0,
-    };
+    let lines = [glove_line.faulty.control(), gripper_line.faulty.control()];
+    let world = World::new(seed, glove, gripper, lines, wires);
     let settings = Settings::<AXES> {
         rate: random.random_range(100.0..800.0),
         ..Settings::default()
@@ -270,9 +169,9 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
     let driver = gripper::driver::Config::for_pc();
     let scan = scan::Config::default();
     let home = Home::new("3f", false, &driver, &scan, "serial");
-    trace.begin(&home, &settings, &image, None);
+    trace.begin(&home, &settings, image, None);
     let bus = Scanner::new(Tapped::new(glove_line, GLOVE, trace.clone()), scan).with_set_baud();
-    let mut app = App::new(
+    let app = App::new(
         Machine {
             clock: clock.clone(),
             random,
@@ -280,9 +179,28 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
         },
         scan::BusScanner::on(bus.into_bus(), scan),
         ThreeFinger::new(Tapped::new(gripper_line, GRIPPER, trace.clone()), driver),
-        stored(&image),
+        stored(image),
         config,
     );
+    (clock, world, app)
+}
+
+/// A session of so many seconds written to a log at `path`, which is then replayed.
+///
+/// # Panics
+/// A log that cannot be written or read.
+pub fn replayed(seed: u64, seconds: u64, path: &Path, log: Log) -> Replayed {
+    let (feed, records) = queue(QUEUE);
+    let trace = feed.trace();
+    let (clock, mut world, mut app) = bench(seed, &images::gentle(seed), &trace);
+    let mut records = Some(records);
+    let mut telling = Telling {
+        feed,
+        seen: [0; 3],
+        frames: 0,
+        commands: 0,
+    };
+    let mut writing = None;
     let mut look = Look::default();
     let end = READY + seconds * 1_000_000;
     loop {
@@ -291,6 +209,14 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
         if let Some(seen) = look.look(app.telemetry()) {
             trace.note(&Entry::Seen(seen));
         }
+        if log == Log::Live {
+            telling.tell(&mut app);
+            if now >= READY
+                && let Some(records) = records.take()
+            {
+                writing = Some(written(path, records));
+            }
+        }
         if now >= end {
             break;
         }
@@ -298,10 +224,10 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
         app.platform_mut().wait_until(due);
     }
     let counters = app.telemetry().counters;
-    let log = SessionLog::create(path, Drawn::USUAL, host::clock::Clock::start(), records);
-    let written = log.expect("a log").finish();
-    assert_eq!((written.fault, trace.lost()), (None, 0));
-    drop(feed);
+    let made = writing.or_else(|| Some(written(path, records.take()?)));
+    let written = made.expect("one of the two").finish();
+    assert_eq!((&written.fault, trace.lost()), (&None, 0));
+    telling.check(path, &written, log);
     let traced = Traced::read(path).expect("a log that can be replayed");
     let started = WallClock::now();
     let same = replay::same(&traced, &mut ()).expect("a replay");
@@ -310,6 +236,7 @@ pub fn replayed(seed: u64, seconds: u64, path: &Path) -> Replayed {
         took: started.elapsed(),
         bytes: path.metadata().expect("a log").len(),
         events: world.events,
+        acts: world.acts,
         followed: counters.following_frames,
         stopped: counters.holds + counters.faults,
         last: app.telemetry().state,

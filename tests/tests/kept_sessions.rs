@@ -5,23 +5,33 @@ use host::recording::traced::Traced;
 use host::replay::{self, Changes};
 use host::session::Driving;
 use loop_tests::images;
-use loop_tests::sessions::replayed;
+use loop_tests::sessions::{Log, replayed};
 
 #[test]
 fn seeded_sessions_with_faults_replay_from_their_logs_with_no_other_byte_or_state() {
     let folder = tempfile::tempdir().expect("a folder");
     let (mut followed, mut stopped) = (0, 0);
-    for seed in 1..=3 {
-        let session = replayed(seed, 15, &folder.path().join(format!("{seed}.mcap")));
-        println!("seed {seed}: {session:?}");
+    let mut acts = [0; 3];
+    // Three whose trace is written at their end, and five that a log's writer follows.
+    let after = (1..=3).map(|seed| (seed, Log::After));
+    for (seed, log) in after.chain((4..=8).map(|seed| (seed, Log::Live))) {
+        let session = replayed(seed, 15, &folder.path().join(format!("{seed}.mcap")), log);
+        println!("seed {seed}, {log:?}: {session:?}");
         assert_eq!(session.same.difference, None, "seed {seed}");
         assert_eq!(session.same.cut, None, "seed {seed}");
         assert!(session.same.time_us > 26_000_000 && session.same.written[1] > 10_000);
         assert!(session.events > 5, "seed {seed}");
         followed += session.followed;
         stopped += session.stopped;
+        if log == Log::Live {
+            let now = session.acts;
+            let now = [now.engaged, now.released, now.settings];
+            acts = core::array::from_fn(|k| acts[k] + now[k]);
+        }
     }
     assert!(followed > 100 && stopped > 0, "{followed} {stopped}");
+    // The person let go and changed settings in those that were written live, too.
+    assert!(acts.iter().all(|acts| *acts > 0), "{acts:?}");
 }
 
 #[test]
@@ -29,7 +39,7 @@ fn a_log_cut_anywhere_or_with_a_flipped_bit_is_replayed_as_far_as_it_goes() {
     let folder = tempfile::tempdir().expect("a folder");
     let whole = folder.path().join("whole.mcap");
     let path = folder.path().join("damaged.mcap");
-    let session = replayed(9, 2, &whole);
+    let session = replayed(9, 2, &whole, Log::Live);
     assert_eq!((session.same.difference, session.same.cut), (None, None));
     let bytes = std::fs::read(&whole).expect("a log");
     let mut read = 0;
@@ -50,6 +60,7 @@ fn a_log_cut_anywhere_or_with_a_flipped_bit_is_replayed_as_far_as_it_goes() {
         let Ok(traced) = Traced::read(&path) else {
             continue;
         };
+        assert!(!traced.found.damage.is_empty(), "bit at {place}: not named");
         let same = replay::same(&traced, &mut ()).expect("a bridge");
         assert_eq!(same.difference, None, "bit at {place}");
     }
@@ -61,7 +72,7 @@ fn another_map_or_setting_is_compared_frame_by_frame_and_the_same_one_differs_in
     let folder = tempfile::tempdir().expect("a folder");
     let place = |seed: u64| folder.path().join(format!("{seed}.mcap"));
     // One in which the gripper followed the hand for some time.
-    let followed = |seed: &u64| replayed(*seed, 12, &place(*seed)).followed > 50;
+    let followed = |seed: &u64| replayed(*seed, 12, &place(*seed), Log::After).followed > 50;
     let seed = (1..=6).find(followed).expect("none of six followed");
     let path = place(seed);
     let traced = Traced::read(&path).expect("a log");

@@ -20,6 +20,8 @@ pub const ALL_JOINTS: u32 = (1 << JOINT_COUNT) - 1;
 pub struct Telemetry<const X: usize> {
     /// Time of the step.
     pub now: Instant,
+    /// By how much the newest step of the supervisor came after its time; `None` where it came before that, with a frame.
+    pub late: Option<Duration>,
     /// State of the supervisor.
     pub state: State,
     /// Where the clutch is.
@@ -140,6 +142,7 @@ impl<const X: usize> Telemetry<X> {
     pub(crate) fn new(now: Instant, glove_state: scan::State) -> Self {
         Self {
             now,
+            late: None,
             state: State::Idle,
             clutch: Position::Open,
             calibration: CalibrationState::default(),

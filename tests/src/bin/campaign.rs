@@ -12,8 +12,9 @@ use loop_tests::emulated::{Loop, alone, cut_power};
 use loop_tests::power_cuts::{
     self, UNIT, every_pair, every_single, four_kilobytes, full_size, small,
 };
+use loop_tests::sessions::{self, Log};
 use loop_tests::trace::{self, record};
-use loop_tests::{bits, images, sessions, slot_contents};
+use loop_tests::{bits, images, slot_contents};
 
 const SEED: u64 = 0x6175_6E74_6C65_7400;
 /// Gripper cycles a second that a bridge on the chip must reach.
@@ -159,7 +160,8 @@ fn sessions() -> Result<(), String> {
     let (outcome, s) = shown("sessions", |p| {
         for seed in 1..=50 {
             let path = folder.path().join(format!("{seed}.mcap"));
-            let session = sessions::replayed(seed, 30, &path);
+            let log = [Log::After, Log::Live][seed as usize % 2];
+            let session = sessions::replayed(seed, 30, &path, log);
             let same = &session.same;
             if same.difference.is_some() || same.cut.is_some() {
                 return Err(format!("seed {seed}: {same:?}"));

@@ -226,6 +226,7 @@ impl<B: Board<X>, const X: usize> App<B, X> {
             follows: output.state.is_moving(),
         });
         self.gripper.set_motion(output.motion, output.stamp);
+        self.telemetry.late = self.due.and_then(|due| now.checked_duration_since(due));
         if self.due.is_none_or(|due| now >= due) {
             self.due = Some(next_on_grid(self.due, now));
         }

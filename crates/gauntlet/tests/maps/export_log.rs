@@ -63,6 +63,17 @@ fn log(folder: &Path, side: Side) -> PathBuf {
     file
 }
 
+/// Which hand a log says it is of, as the field's own reader finds it.
+fn hand(file: &Path) -> Option<String> {
+    let bytes = std::fs::read(file).unwrap();
+    let summary = mcap::Summary::read(&bytes).unwrap().unwrap();
+    let mut angles = summary
+        .channels
+        .values()
+        .filter(|channel| channel.topic == "/glove/joint_angles");
+    angles.next().unwrap().metadata.get("hand").cloned()
+}
+
 fn tables(said: &serde_json::Value) -> impl Iterator<Item = &serde_json::Value> {
     said["tables"].as_array().unwrap().iter()
 }
@@ -76,6 +87,7 @@ fn lines(file: &Path) -> Vec<String> {
 fn a_log_becomes_three_tables_beside_it_and_is_read_in_the_place_of_one() {
     let folder = tempfile::tempdir().unwrap();
     let file = log(folder.path(), Side::Left);
+    assert_eq!(hand(&file), Some("left".to_owned()));
     let said = json(&run(&["export", path(&file), "--json"]));
     assert_eq!(said["result"], "export");
     let rows: Vec<u64> = tables(&said)
@@ -134,6 +146,7 @@ fn a_log_becomes_three_tables_beside_it_and_is_read_in_the_place_of_one() {
 fn tables_are_never_written_over_anything_and_a_cut_log_gives_what_it_has() {
     let folder = tempfile::tempdir().unwrap();
     let file = log(folder.path(), Side::Right);
+    assert_eq!(hand(&file), Some("right".to_owned()));
     let poses = folder.path().join("hand.csv");
     std::fs::write(&poses, "precious").unwrap();
     let named = ["export", path(&file), "--poses", path(&poses)];

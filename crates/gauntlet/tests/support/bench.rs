@@ -31,13 +31,17 @@ pub struct Bench {
     folder: tempfile::TempDir,
 }
 
-/// Flat, then all fingers bend and stretch every 4 s.
+/// Flat, then all fingers bend and stretch every 4 s, from flat each time.
 pub fn hand(moves: Arc<AtomicBool>) -> impl Fn(f64) -> [f32; 25] {
     let since = Mutex::new(None);
     move |time| {
         let mut angles = [0.0; 25];
-        if moves.load(Ordering::Relaxed) {
-            let begin = *since.lock().unwrap().get_or_insert(time);
+        let mut since = since.lock().unwrap();
+        if !moves.load(Ordering::Relaxed) {
+            // No hand jumps from flat into the midst of a movement.
+            *since = None;
+        } else {
+            let begin = *since.get_or_insert(time);
             let bent = 0.5 - 0.5 * ((time - begin) * std::f64::consts::FRAC_PI_2).cos();
             for finger in 1..5 {
                 angles[5 * finger] = bent as f32;

@@ -36,15 +36,15 @@ impl World {
 }
 
 /// A bridge in QEMU between a glove whose hand moves once that is set, and an active gripper.
-struct Chip {
-    emulator: Emulator,
+pub(super) struct Chip {
+    pub(super) emulator: Emulator,
     glove: VirtualGlove,
     gripper: VirtualGripper,
-    moves: Arc<AtomicBool>,
+    pub(super) moves: Arc<AtomicBool>,
     _ports: [rig::pty::Handle; 2],
 }
 
-fn chip() -> Option<Chip> {
+pub(super) fn chip() -> Option<Chip> {
     let firmware = find_firmware(None).ok().filter(|_| qemu_is_there());
     let Some(firmware) = firmware else {
         rig::skip::skipped(

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
+use host::recording::salvage;
 use host::recording::traced::Traced;
 use host::replay;
 use rig::skip::{Need, skipped};
@@ -101,17 +102,19 @@ fn killed(bench: &mut Bench, number: usize, after: Duration) -> (f64, Duration) 
     let stalled = stalls.worst();
     running.0.wait().unwrap();
     let (messages, newest) = readable(&bench.log);
-    if let Ok(traced) = Traced::read(&bench.log) {
-        assert!(!traced.found.finished, "nobody finished it");
-        let same = replay::same(&traced, &mut ()).unwrap();
-        assert_eq!(same.difference, None, "killed after {after:?}");
-        assert!(
-            messages > 0 && same.seen > 0,
-            "killed after {after:?}: {same:?}"
-        );
+    let traced = Traced::read(&bench.log);
+    if messages == 0 {
+        // Before its first chunk is closed it has nothing yet, and says so.
+        let error = traced.unwrap_err().to_string();
+        assert!(error.contains("cannot be replayed"), "{error}");
+        return (killed - made, stalled);
     }
-    // Before its first chunk is closed it has nothing yet.
-    (killed - if messages == 0 { made } else { newest }, stalled)
+    let traced = traced.unwrap_or_else(|error| panic!("killed after {after:?}: {error:#}"));
+    assert!(!traced.found.finished, "nobody finished it");
+    let same = replay::same(&traced, &mut ()).unwrap();
+    assert_eq!(same.difference, None, "killed after {after:?}");
+    assert!(same.seen > 0, "killed after {after:?}: {same:?}");
+    (killed - newest, stalled)
 }
 
 #[test]
@@ -247,7 +250,8 @@ fn filled(bench: &mut Bench, number: usize, full: Full) -> Option<(Duration, usi
     // It drives on.
     assert!(
         !bench.stands_for(Duration::from_secs(4)),
-        "{full:?}: nothing is commanded any more"
+        "{full:?}: nothing is commanded any more: {}",
+        said.so_far()
     );
     interrupt(&running.0);
     let output = std::process::Output {
@@ -278,6 +282,10 @@ fn a_log_that_a_full_disk_ends_is_told_and_the_run_drives_on() {
     for (number, full) in [Full::Limit(200), Full::Disk(300)].into_iter().enumerate() {
         let stalls = Stalls::watch();
         let Some((told, _)) = filled(&mut bench, number, full) else {
+            skipped(
+                Need::Machine,
+                &format!("{full:?}: this user mounts no disk"),
+            );
             continue;
         };
         if told > TOLD && stalls.worst() > BUSY {
@@ -308,7 +316,10 @@ fn a_disk_full_at_twenty_sizes_is_told_in_two_seconds_and_the_run_drives_on() {
         };
         let went = filled(&mut bench, number, full);
         // Who may mount no disk has a limit at every size.
-        let went = went.or_else(|| filled(&mut bench, number, Full::Limit(kilobytes)));
+        let went = went.or_else(|| {
+            skipped(Need::Machine, &format!("{full:?}: a limit in its place"));
+            filled(&mut bench, number, Full::Limit(kilobytes))
+        });
         let (told, messages) = went.unwrap();
         println!(
             "{full:?} KiB: told {:.2} s after the last byte, {messages} messages whole",
@@ -346,4 +357,31 @@ fn a_disk_without_room_for_a_logs_first_half_second_is_told_before_anything_is_b
         assert_eq!(bench.gripper.writes(), 0, "{blocks}");
         assert!(!bench.log.exists(), "{blocks}");
     }
+}
+
+#[test]
+fn the_log_of_a_left_hand_says_so_and_its_export_is_a_left_one() {
+    let bench = Bench::new(&["--hand", "left", "--engage", "--json", "--seconds", "3"]);
+    let output = support::run(&bench.arguments());
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+    let mut hands = Vec::new();
+    let file = std::fs::read(&bench.log).unwrap();
+    salvage::read(&file, |message| {
+        hands.extend(message.channel.metadata.get("hand").cloned());
+    })
+    .unwrap();
+    hands.dedup();
+    assert_eq!(hands, ["left"]);
+    let table = bench.log.with_extension("csv");
+    let [log, table] = [&bench.log, &table].map(|path| path.to_str().unwrap());
+    let exported = support::json(&support::run(&["export", log, "--openxr", table, "--json"]));
+    let error = exported["openxr_angle_error_deg"].as_f64();
+    assert!(error < Some(0.01), "{exported}");
+    let text = std::fs::read_to_string(table).unwrap();
+    let mut lines = text.lines().map(|line| line.split(','));
+    let column = lines.next().unwrap().position(|name| name == "thumb_tip_x");
+    let mut first = lines.next().unwrap();
+    let x: f64 = first.nth(column.unwrap()).unwrap().parse().unwrap();
+    // A left hand's thumb is to the right of its wrist, seen from its back with the fingers ahead.
+    assert!(x > 0.03, "{x}");
 }

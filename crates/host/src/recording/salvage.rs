@@ -1,17 +1,23 @@
 //! A session log read, whole or damaged: what can be read is read, and the rest is named.
 
+mod counted;
+mod end;
+mod frames;
+
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use crc::{CRC_32_ISO_HDLC, Crc};
 use mcap::MAGIC;
-use mcap::records::{MessageHeader, Record, op};
+use mcap::records::{self, MessageHeader, Record, op};
 
-const CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+use counted::Counted;
+use end::End;
+use frames::{CRC, Sum, chunk, framed, is_proved, parsed, printable};
+
 /// How many times its length a damaged file is looked through at most.
 const SEARCH: usize = 8;
-/// Opcode and length.
-const FRAME: usize = 9;
+/// Damage that is named; what comes after it is put together.
+const NAMED: usize = 1_000;
 
 /// One channel of a log.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -89,15 +95,8 @@ pub fn read_while(
     if !file.starts_with(MAGIC) {
         return Err(NoLog);
     }
-    let mut reading = Reading {
-        file,
-        found: Found::default(),
-        schemas: BTreeMap::new(),
-        channels: BTreeMap::new(),
-        each: &mut each,
-        search: file.len().saturating_mul(SEARCH),
-    };
-    reading.all(go_on);
+    let mut reading = Reading::of(file, &mut each);
+    reading.all(End::of(file), go_on);
     Ok(reading.found)
 }
 
@@ -114,54 +113,156 @@ struct Reading<'f, 'e> {
     each: &'e mut dyn FnMut(Message<'_>),
     /// Bytes that may still be looked through for chunks behind damage: beginnings that are none would each cost the rest of the file.
     search: usize,
+    counted: Counted,
+    /// Where chunks were read: where they begin and end.
+    chunks: BTreeMap<usize, usize>,
+    /// What the index that follows the newest chunk must say: by channel, log times and offsets of the messages.
+    index: BTreeMap<u16, Vec<(u64, u64)>>,
+    /// The sum over the data so far, and how far that is.
+    sum: (Sum, usize),
 }
 
-/// What a file says of itself, without what would command a terminal.
-fn printable(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).take(80).collect()
+/// A channel, whose schema is one of these.
+fn channel_of(channel: records::Channel, schemas: &BTreeMap<u16, String>) -> Channel {
+    Channel {
+        topic: channel.topic,
+        encoding: channel.message_encoding,
+        schema: schemas.get(&channel.schema_id).cloned().unwrap_or_default(),
+        metadata: channel.metadata,
+    }
 }
 
-/// The record at `offset`: opcode and where its body is; `None` where none fits.
-fn framed(bytes: &[u8], offset: usize) -> Option<(u8, Range<usize>)> {
-    let frame = bytes.get(offset..offset + FRAME)?;
-    let (&code, length) = frame.split_first()?;
-    let length = u64::from_le_bytes(length.try_into().ok()?);
-    let start = offset + FRAME;
-    let end = start.checked_add(usize::try_from(length).ok()?)?;
-    (end <= bytes.len()).then_some((code, start..end))
-}
-
-impl Reading<'_, '_> {
-    fn all(&mut self, mut go_on: impl FnMut(usize) -> bool) {
-        let mut offset = MAGIC.len();
-        while offset < self.file.len() && go_on(offset) {
-            if self.file.get(offset..) == Some(MAGIC) {
-                break;
-            }
-            let Some((code, body)) = framed(self.file, offset) else {
-                let next = self.next_chunk(offset + 1);
-                let end = next.unwrap_or(self.file.len());
-                let what = match next {
-                    Some(_) => "no record, and everything up to the next chunk",
-                    None => "the file ends within a record",
-                };
-                self.damaged(offset..end, what);
-                offset = end;
-                continue;
-            };
-            let end = body.end;
-            match code {
-                op::CHUNK => self.chunk(body),
-                op::HEADER..=op::DATA_END => self.record(code, body),
-                _ => self.damaged(offset..end, "a record of an unknown kind"),
-            }
-            offset = end;
+impl<'f, 'e> Reading<'f, 'e> {
+    fn of(file: &'f [u8], each: &'e mut dyn FnMut(Message<'_>)) -> Self {
+        Self {
+            file,
+            found: Found::default(),
+            schemas: BTreeMap::new(),
+            channels: BTreeMap::new(),
+            each,
+            search: file.len().saturating_mul(SEARCH),
+            counted: Counted::default(),
+            chunks: BTreeMap::new(),
+            index: BTreeMap::new(),
+            sum: (CRC.digest(), 0),
         }
+    }
+
+    /// Reads all there is before `end`, and compares it with that.
+    fn all(&mut self, end: Option<End>, mut go_on: impl FnMut(usize) -> bool) {
+        if let Some(end) = &end {
+            // From here on it is the data.
+            self.file = self.file.get(..end.data).unwrap_or_default();
+            self.found.finished = end.index.is_some();
+            let channels = end.index.iter().flat_map(|index| &index.channels);
+            self.channels
+                .extend(channels.map(|(id, channel)| (*id, channel.clone())));
+        }
+        let mut offset = MAGIC.len();
+        while offset < self.file.len() {
+            if !go_on(offset) {
+                return;
+            }
+            offset = self.record(offset);
+            let (sum, summed) = &mut self.sum;
+            sum.update(self.file.get(*summed..offset).unwrap_or_default());
+            *summed = offset;
+        }
+        self.compare(end.unwrap_or_default());
+    }
+
+    /// Reads the record at `offset`; where the next one is.
+    fn record(&mut self, offset: usize) -> usize {
+        let Some((code, body)) = framed(self.file, offset) else {
+            return self.lost(offset, "no record");
+        };
+        let next = body.end;
+        let is_first = offset == MAGIC.len();
+        let read = match code {
+            _ if (code == op::HEADER) != is_first => {
+                Err("no header, or one in the midst".to_owned())
+            }
+            op::CHUNK => self.chunk(offset, &body),
+            op::MESSAGE_INDEX => self.message_index(&body),
+            // A log that has chunks has messages in chunks only: no checksum stands for others.
+            op::MESSAGE if !self.chunks.is_empty() => {
+                Err("a message outside of a chunk".to_owned())
+            }
+            op::HEADER | op::SCHEMA | op::CHANNEL | op::MESSAGE => {
+                self.described(code, &body).map(|_| ())
+            }
+            ..=op::DATA_END if !matches!(code, op::ATTACHMENT | op::METADATA) => {
+                Err("a record that belongs to the end of a log".to_owned())
+            }
+            _ if is_proved(self.file, &body) => {
+                Err("a chunk that says it is something else".to_owned())
+            }
+            _ if !self.goes_on(next) => Err("a record that leads nowhere".to_owned()),
+            // This program writes none.
+            op::ATTACHMENT | op::METADATA => Ok(()),
+            _ => {
+                self.damaged(offset..next, "a record of an unknown kind");
+                Ok(())
+            }
+        };
+        match read {
+            Ok(()) => next,
+            Err(what) if code != op::CHUNK && is_proved(self.file, &body) => {
+                // All but its first byte is right.
+                self.damaged(
+                    offset..next,
+                    format!("{what}; it is a whole chunk, and was read"),
+                );
+                let _ = self.chunk(offset, &body);
+                next
+            }
+            Err(what) => self.lost(offset, &what),
+        }
+    }
+
+    /// Whether something that can be read is at `offset`: only then the length of what is not looked into may be believed.
+    fn goes_on(&self, offset: usize) -> bool {
+        let next = framed(self.file, offset);
+        let is_known = next.is_some_and(|(code, body)| match code {
+            op::CHUNK => is_proved(self.file, &body),
+            op::ATTACHMENT | op::METADATA | op::DATA_END => true,
+            _ => self
+                .file
+                .get(body)
+                .is_some_and(|bytes| parsed(code, bytes).is_some()),
+        });
+        offset == self.file.len() || is_known
+    }
+
+    /// Nothing can be read at `offset`; where it can again.
+    fn lost(&mut self, offset: usize, what: &str) -> usize {
+        // Its length may be wrong: from the next byte on.
+        let found = self.next_chunk(offset + 1);
+        let next = found.unwrap_or(self.file.len());
+        let until = match found {
+            Some(_) => "the next chunk",
+            None => "the end",
+        };
+        self.damaged(
+            offset..next,
+            format!("{what}, and everything up to {until}"),
+        );
+        next
     }
 
     fn damaged(&mut self, bytes: Range<usize>, what: impl Into<String>) {
         let what = what.into();
-        self.found.damage.push(Damage { bytes, what });
+        self.name(Damage { bytes, what });
+    }
+
+    fn name(&mut self, damage: Damage) {
+        match self.found.damage.get_mut(NAMED) {
+            None => self.found.damage.push(damage),
+            Some(last) => {
+                last.bytes.end = last.bytes.end.max(damage.bytes.end);
+                "and more".clone_into(&mut last.what);
+            }
+        }
     }
 
     /// Where the next whole chunk begins, behind something that is no record.
@@ -175,62 +276,92 @@ impl Reading<'_, '_> {
                 return false;
             };
             self.search -= body.len();
-            messages_of(self.file, body).is_ok()
+            is_proved(self.file, &body)
         })
     }
 
-    fn chunk(&mut self, body: Range<usize>) {
-        match messages_of(self.file, body.clone()) {
-            Ok(records) => {
-                let mut offset = records.start;
-                let inside = &self.file[..records.end];
-                while let Some((code, body)) = framed(inside, offset) {
-                    offset = body.end;
-                    self.record(code, body);
+    fn chunk(&mut self, offset: usize, body: &Range<usize>) -> Result<(), String> {
+        let (header, records) = chunk(self.file, body)?;
+        self.chunks.insert(offset, body.end);
+        self.index.clear();
+        let (mut offset, start) = (records.start, records.start);
+        let inside = self.file.get(..records.end).unwrap_or_default();
+        let mut times: Option<(u64, u64)> = None;
+        while let Some((code, body)) = framed(inside, offset) {
+            let known = matches!(code, op::SCHEMA | op::CHANNEL | op::MESSAGE);
+            match known.then(|| self.described(code, &body)) {
+                Some(Ok(Some((id, time)))) => {
+                    let (first, last) = times.unwrap_or((time, time));
+                    times = Some((first.min(time), last.max(time)));
+                    let entry = (time, (offset - start) as u64);
+                    self.index.entry(id).or_default().push(entry);
                 }
+                Some(Ok(None)) => {}
+                _ => self.damaged(offset..body.end, "a record that cannot be read"),
             }
-            Err(what) => self.damaged(body, what),
+            offset = body.end;
+        }
+        if offset != records.end {
+            self.damaged(
+                offset..records.end,
+                "the end of a chunk, which is no record",
+            );
+        }
+        if times.unwrap_or((0, 0)) != (header.message_start_time, header.message_end_time) {
+            self.damaged(
+                body.clone(),
+                "a chunk whose times are not those of its messages; they are read",
+            );
+        }
+        Ok(())
+    }
+
+    /// The index of one channel behind a chunk.
+    fn message_index(&mut self, body: &Range<usize>) -> Result<(), String> {
+        let bytes = self.file.get(body.clone()).unwrap_or_default();
+        let Some(Record::MessageIndex(index)) = parsed(op::MESSAGE_INDEX, bytes) else {
+            return Err("an index of a chunk that contradicts itself".to_owned());
+        };
+        let said = index
+            .records
+            .iter()
+            .map(|entry| (entry.log_time, entry.offset));
+        let found = self.index.remove(&index.channel_id).unwrap_or_default();
+        match said.eq(found) {
+            true => Ok(()),
+            false => Err("an index that is not that of the chunk before it".to_owned()),
         }
     }
 
-    fn record(&mut self, code: u8, body: Range<usize>) {
-        // The other kinds, an index and a summary of it, are not needed.
-        if !matches!(
-            code,
-            op::HEADER | op::FOOTER | op::SCHEMA | op::CHANNEL | op::MESSAGE
-        ) {
-            return;
-        }
-        let Some(bytes) = self.file.get(body.clone()) else {
-            return;
-        };
-        match mcap::parse_record(code, bytes) {
-            Ok(Record::Header(header)) => self.found.program = printable(&header.library),
-            Ok(Record::Footer(_)) => self.found.finished = true,
-            Ok(Record::Schema { header, .. }) => {
+    /// Takes a record that says something of the log; of a message its channel and log time.
+    fn described(&mut self, code: u8, body: &Range<usize>) -> Result<Option<(u16, u64)>, String> {
+        let bytes = self.file.get(body.clone()).unwrap_or_default();
+        match parsed(code, bytes) {
+            Some(Record::Header(header)) => {
+                self.found.program = printable(&header.library);
+                self.counted.from_zero = header.library.starts_with("gauntlet ");
+            }
+            Some(Record::Schema { header, .. }) => {
                 self.schemas.insert(header.id, header.name);
             }
-            Ok(Record::Channel(channel)) => {
-                let schema = self.schemas.get(&channel.schema_id);
-                let known = Channel {
-                    topic: channel.topic,
-                    encoding: channel.message_encoding,
-                    schema: schema.cloned().unwrap_or_default(),
-                    metadata: channel.metadata,
-                };
-                self.channels.insert(channel.id, known);
+            Some(Record::Channel(channel)) => {
+                let id = channel.id;
+                self.channels.insert(id, channel_of(channel, &self.schemas));
             }
-            Ok(Record::Message { header, data }) => self.message(&header, &data, body),
-            Ok(_) => {}
-            Err(error) => self.damaged(body, error.to_string()),
+            Some(Record::Message { header, data }) => {
+                self.message(&header, &data, body);
+                return Ok(Some((header.channel_id, header.log_time)));
+            }
+            _ => return Err("a record that contradicts itself".to_owned()),
         }
+        Ok(None)
     }
 
-    fn message(&mut self, header: &MessageHeader, data: &[u8], body: Range<usize>) {
+    fn message(&mut self, header: &MessageHeader, data: &[u8], body: &Range<usize>) {
         let Some(channel) = self.channels.get(&header.channel_id) else {
-            let what = format!("a message of an unknown channel, {}", header.channel_id);
-            return self.damaged(body, what);
+            return self.counted.take_unknown(header.channel_id, body);
         };
+        let hole = self.counted.take(header, channel, body);
         self.found.messages += 1;
         (self.each)(Message {
             channel,
@@ -238,27 +369,37 @@ impl Reading<'_, '_> {
             publish_time: header.publish_time,
             data,
         });
+        if let Some(hole) = hole {
+            self.name(hole);
+        }
     }
-}
 
-/// Where the records of a chunk are, if its checksum is right.
-fn messages_of(file: &[u8], body: Range<usize>) -> Result<Range<usize>, String> {
-    let bytes = file.get(body.clone()).unwrap_or_default();
-    let Ok(Record::Chunk { header, data }) = mcap::parse_record(op::CHUNK, bytes) else {
-        return Err("a chunk's beginning".to_owned());
-    };
-    if !header.compression.is_empty() {
-        return Err(format!(
-            "a chunk compressed with {}, which is not read here",
-            header.compression
-        ));
+    /// What should be there, and what was read.
+    fn compare(&mut self, end: End) {
+        let chunks = end.index.iter().flat_map(|index| &index.chunks);
+        for (start, (stop, times)) in chunks {
+            let overlaps =
+                |damage: &Damage| damage.bytes.start < *stop && *start < damage.bytes.end;
+            let read = self.chunks.get(start) == Some(stop);
+            if !read && !self.found.damage.iter().any(overlaps) {
+                let [from, until] = [times.start, times.end].map(|at| self.counted.seconds(at));
+                let what = format!(
+                    "a chunk of {from} to {until} of the log that is in its index and not there"
+                );
+                self.damaged(*start..*stop, what);
+            }
+        }
+        for missing in self.counted.missing(end.index.as_ref(), self.file.len()) {
+            self.name(missing);
+        }
+        let sum = std::mem::replace(&mut self.sum.0, CRC.digest()).finalize();
+        if end.sum != 0 && end.sum != sum && self.found.damage.is_empty() {
+            self.damaged(
+                0..self.file.len(),
+                "the checksum over all of it is wrong, and those of the chunks are right",
+            );
+        }
     }
-    if header.uncompressed_crc != 0 && CRC.checksum(&data) != header.uncompressed_crc {
-        return Err("a chunk whose checksum is wrong".to_owned());
-    }
-    // The records end the body.
-    let start = body.end.saturating_sub(data.len());
-    Ok(start..body.end)
 }
 
 #[cfg(test)]

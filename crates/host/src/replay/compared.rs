@@ -2,8 +2,11 @@
 
 use anyhow::Result;
 use bridge::{App, Board};
+use glove::hand::SEGMENT_COUNT;
+use glove::imu::UniqueId;
 
 use super::{Both, Changes, Follow, other, same};
+use crate::failure::Failure;
 use crate::recording::traced::Traced;
 use crate::session::axes::Axes;
 
@@ -23,11 +26,14 @@ struct Moments {
     at: u64,
     /// After which there is nothing to compare with, µs.
     until: Option<u64>,
+    /// The sensors' ids, as they are wired.
+    ids: [Option<UniqueId>; SEGMENT_COUNT],
 }
 
 impl Follow for Moments {
     fn turn<B: Board<X>, const X: usize>(&mut self, app: &mut App<B, X>, at: u64) -> bool {
         self.at = at;
+        self.ids = app.scanner_mut().ids();
         let seen = app.telemetry();
         let newest = self.all.last().map_or(0, |moment| moment.frame);
         if seen.frame_sequence != newest {
@@ -77,10 +83,18 @@ pub struct Compared {
 /// Replays the log with its own bridge and with another one; `follow` sees the turns of both, one after the other.
 ///
 /// # Errors
-/// As [`same`].
+/// As [`same`]; and another profile is not of the glove in the log.
 pub fn compare(traced: &Traced, changes: &Changes, follow: &mut impl Follow) -> Result<Compared> {
     let mut ours = Moments::default();
     same(traced, &mut Both(&mut ours, follow))?;
+    if let Some(Err(misfit)) = changes.profile.as_ref().map(|other| other.fits(&ours.ids)) {
+        let log = traced.path.display();
+        return Err(Failure::usage(
+            format!("the profile is not of the glove in {log}: {misfit}"),
+            "another profile of the same glove",
+        )
+        .into());
+    }
     let mut theirs = Moments {
         until: Some(ours.at),
         ..Moments::default()

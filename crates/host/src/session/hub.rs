@@ -334,7 +334,7 @@ mod tests {
             let now = gripper::Instant::from_ticks(10_000);
             match said.totals {
                 Totals::OnChip { .. } => said.totals.count(&grown, Instant::now() + AFTER),
-                _ => said.totals.here(&here(7), now, Scheduling::Shared),
+                _ => said.totals.here(&here(7), now, None, Scheduling::Shared),
             }
             drop(said);
             let shown = hub.progress().gripper_faults;

@@ -62,6 +62,8 @@ pub struct Summary {
     pub worst_late_us: u32,
     /// Those of them after which more than 100 ms were missing: the program stood still. In this process only.
     pub stalls: Option<u32>,
+    /// By how much 99 of 100 steps came after their time at most, µs. In this process only.
+    pub step_late_p99_us: Option<u64>,
     /// Cycles of the gripper that ended in an error.
     pub gripper_errors: u32,
     /// How often motion was held.

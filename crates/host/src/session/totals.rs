@@ -5,11 +5,12 @@ use std::time::Instant;
 use bridge::protocol::message;
 use bridge::telemetry::Counters;
 use bridge::timing::PERIOD;
-use gripper::link;
+use gripper::{Duration, link};
 
 use super::replies::Failed;
 use super::summary::Summary;
 use crate::realtime::Scheduling;
+use crate::stats::Percentiles;
 
 /// What only a home's own counters tell.
 #[derive(Debug, Default)]
@@ -40,11 +41,16 @@ pub(super) struct Here {
     at: Option<gripper::Instant>,
     /// The latest step of the run, µs: the counters know only that since the start.
     worst_late_us: u32,
+    /// How late its steps came.
+    late: Percentiles,
     scheduling: Scheduling,
 }
 
 impl Here {
-    fn count(&mut self, counters: &Counters, now: gripper::Instant) {
+    fn count(&mut self, counters: &Counters, now: gripper::Instant, late: Option<Duration>) {
+        if let Some(late) = late.filter(|_| counters.steps != self.newest.steps) {
+            self.late.add(late.as_micros());
+        }
         if counters.late_steps != self.newest.late_steps {
             let gap = self.at.and_then(|at| now.checked_duration_since(at));
             let late = gap.map_or(0, |gap| gap.as_micros().saturating_sub(PERIOD.as_micros()));
@@ -81,17 +87,24 @@ impl Totals {
             newest: *counters,
             at: None,
             worst_late_us: 0,
+            late: Percentiles::default(),
             scheduling: Scheduling::Shared,
         }))
     }
 
-    /// A bridge in this process has counted this after its step at `now`.
-    pub fn here(&mut self, counters: &Counters, now: gripper::Instant, scheduling: Scheduling) {
+    /// A bridge in this process has counted this after its step at `now`, which came so `late`.
+    pub fn here(
+        &mut self,
+        counters: &Counters,
+        now: gripper::Instant,
+        late: Option<Duration>,
+        scheduling: Scheduling,
+    ) {
         if !matches!(self, Self::InProcess(_)) {
             *self = Self::in_process(&Counters::default());
         }
         if let Self::InProcess(here) = self {
-            here.count(counters, now);
+            here.count(counters, now, late);
             here.scheduling = scheduling;
         }
     }
@@ -143,7 +156,10 @@ impl Totals {
     pub fn begin(&mut self) {
         match self {
             Self::None => {}
-            Self::InProcess(here) => (here.before, here.worst_late_us) = (here.newest, 0),
+            Self::InProcess(here) => {
+                here.before = here.newest;
+                (here.worst_late_us, here.late) = (0, Percentiles::default());
+            }
             Self::OnChip {
                 before,
                 newest,
@@ -172,6 +188,7 @@ impl Totals {
             Self::None => summary,
             Self::InProcess(here) => Summary {
                 gripper_failed: Some(Failed::between(&here.before.gripper, &here.newest.gripper)),
+                step_late_p99_us: here.late.at(0.99),
                 ..summary.with(&here.grown(), here.scheduling)
             },
             Self::OnChip {
@@ -193,7 +210,7 @@ impl Totals {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::time::Duration;
+    use std::time::Duration as WallTime;
 
     fn counters(late_steps: u32, worst_late_us: u32) -> Counters {
         Counters {
@@ -209,7 +226,8 @@ mod tests {
     fn what_came_late_while_things_were_brought_up_is_none_of_the_run() {
         let at = |ms: u64| gripper::Instant::from_ticks(1_000 * ms);
         let mut totals = Totals::default();
-        totals.here(&counters(1, 60_000), at(70), Scheduling::Shared);
+        let us = |us| Some(Duration::from_micros(us));
+        totals.here(&counters(1, 60_000), at(70), us(60_000), Scheduling::Shared);
         totals.begin();
         let sum = |totals: &Totals| totals.sum(Summary::default());
         let begun = sum(&totals);
@@ -219,12 +237,26 @@ mod tests {
         );
         assert!(!begun.too_busy());
         // Less late than before, and later than ever.
-        totals.here(&counters(2, 60_000), at(85), Scheduling::Shared);
-        assert_eq!(sum(&totals).worst_late_us, 5_000);
-        totals.here(&counters(3, 80_000), at(175), Scheduling::Shared);
+        totals.here(&counters(2, 60_000), at(85), us(5_000), Scheduling::Shared);
         let now = sum(&totals);
-        assert_eq!((now.late_steps, now.worst_late_us), (2, 80_000));
-        assert_eq!(now.gripper_errors, 2);
+        assert_eq!(
+            (now.worst_late_us, now.step_late_p99_us),
+            (5_000, Some(5_000))
+        );
+        // The same step looked at twice, and one that came with a frame, before its time.
+        totals.here(&counters(2, 60_000), at(85), us(5_000), Scheduling::Shared);
+        totals.here(
+            &counters(3, 80_000),
+            at(175),
+            us(80_000),
+            Scheduling::Shared,
+        );
+        totals.here(&counters(4, 80_000), at(180), None, Scheduling::Shared);
+        let now = sum(&totals);
+        assert_eq!((now.late_steps, now.worst_late_us), (3, 80_000));
+        let p99 = now.step_late_p99_us.unwrap();
+        assert!((79_000..=80_000).contains(&p99), "{p99}");
+        assert_eq!(now.gripper_errors, 3);
     }
 
     #[test]
@@ -234,14 +266,14 @@ mod tests {
             ..Default::default()
         };
         let now = Instant::now();
-        let ago = now.checked_sub(Duration::from_millis(900)).unwrap();
+        let ago = now.checked_sub(WallTime::from_millis(900)).unwrap();
         for (after_ms, counted) in [(50, 4), (5_000, 29)] {
             let mut totals = Totals::on_chip(&frames(0), ago);
             totals.begin();
             assert!(totals.awaits());
-            totals.count(&frames(25), now + Duration::from_millis(after_ms));
+            totals.count(&frames(25), now + WallTime::from_millis(after_ms));
             assert!(!totals.awaits());
-            totals.count(&frames(29), now + Duration::from_secs(6));
+            totals.count(&frames(29), now + WallTime::from_secs(6));
             assert_eq!(totals.sum(Summary::default()).glove_frames, counted);
         }
     }

@@ -233,8 +233,12 @@ impl Worker {
         };
         // What a glove lacks that is not calibrated is told as that.
         let useless = telemetry.frame_sequence > 0 && !telemetry.gives_angles;
-        said.totals
-            .here(&telemetry.counters, telemetry.now, self.scheduling);
+        said.totals.here(
+            &telemetry.counters,
+            telemetry.now,
+            telemetry.late,
+            self.scheduling,
+        );
         let seen = Snapshot {
             ids: app.scanner_mut().ids(),
             glove_baud: app.scanner_mut().bus_mut().line_baud(),

@@ -43,10 +43,17 @@ impl Kept {
     }
 }
 
+/// Bytes that the system is asked for at a time.
+const READ: usize = 512;
+
 /// An open line. Reads and writes end by their deadlines.
 #[derive(Debug)]
 pub(super) struct Line {
     descriptor: Arc<OwnedFd>,
+    /// What has come and was not taken yet: the bytes of `came` from `taken` to `filled`.
+    came: [u8; READ],
+    taken: usize,
+    filled: usize,
     /// Keeps a serial port's lock.
     _port: Option<Port>,
     kept: Kept,
@@ -65,11 +72,7 @@ impl Line {
             Address::Serial(path) => {
                 let port = Port::open(path, BAUD).map_err(Error::Open)?;
                 let descriptor = port.watch().descriptor().ok_or(Error::Lost)?;
-                Ok(Self {
-                    descriptor,
-                    _port: Some(port),
-                    kept: Kept::default(),
-                })
+                Ok(Self::of(descriptor, Some(port)))
             }
             Address::Unix(path) => {
                 let path = path.clone();
@@ -86,11 +89,18 @@ impl Line {
 
     fn over(descriptor: OwnedFd) -> io::Result<Self> {
         fcntl_setfl(&descriptor, fcntl_getfl(&descriptor)? | OFlags::NONBLOCK)?;
-        Ok(Self {
-            descriptor: Arc::new(descriptor),
-            _port: None,
+        Ok(Self::of(Arc::new(descriptor), None))
+    }
+
+    fn of(descriptor: Arc<OwnedFd>, port: Option<Port>) -> Self {
+        Self {
+            descriptor,
+            came: [0; READ],
+            taken: 0,
+            filled: 0,
+            _port: port,
             kept: Kept::default(),
-        })
+        }
     }
 
     /// The same, written down.
@@ -99,13 +109,27 @@ impl Line {
         Self { kept, ..self }
     }
 
-    /// Bytes that are there, waiting for the first until `deadline`; 0 when none came.
-    pub(super) fn read(&mut self, buffer: &mut [u8], deadline: Instant) -> Result<usize, Broken> {
+    /// The next byte, which is waited for until `deadline`; `None` when none came.
+    pub(super) fn byte(&mut self, deadline: Instant) -> Result<Option<u8>, Broken> {
+        if self.taken == self.filled {
+            self.filled = self.read(deadline)?;
+            self.taken = 0;
+        }
+        let byte = self
+            .came
+            .get(..self.filled)
+            .and_then(|came| came.get(self.taken));
+        self.taken = self.filled.min(self.taken + 1);
+        Ok(byte.copied())
+    }
+
+    /// Reads what is there into `came`, waiting for the first byte until `deadline`; 0 when none came.
+    fn read(&mut self, deadline: Instant) -> Result<usize, Broken> {
         loop {
-            match rustix::io::read(&*self.descriptor, &mut *buffer) {
+            match rustix::io::read(&*self.descriptor, &mut self.came) {
                 Ok(0) => return Err(io::ErrorKind::UnexpectedEof.into()),
                 Ok(count) => {
-                    let (port, bytes) = (HOST, buffer.get(..count).unwrap_or_default());
+                    let (port, bytes) = (HOST, self.came.get(..count).unwrap_or_default());
                     self.kept.note(&Entry::Read { port, bytes });
                     return Ok(count);
                 }
@@ -118,12 +142,18 @@ impl Line {
         }
     }
 
-    /// Writes all of `bytes` by `deadline`; a line that does not take them by then is broken.
+    /// Writes all of `bytes` by `deadline`; a line that does not take them by then is broken. What it took is written down.
     pub(super) fn write(&mut self, mut bytes: &[u8], deadline: Instant) -> Result<(), Broken> {
-        self.kept.note(&Entry::Write { port: HOST, bytes });
         while !bytes.is_empty() {
             match rustix::io::write(&*self.descriptor, bytes) {
-                Ok(count) if count > 0 => bytes = bytes.get(count..).unwrap_or_default(),
+                Ok(count) if count > 0 => {
+                    let (took, rest) = bytes.split_at(count.min(bytes.len()));
+                    self.kept.note(&Entry::Write {
+                        port: HOST,
+                        bytes: took,
+                    });
+                    bytes = rest;
+                }
                 Ok(_) | Err(Errno::AGAIN | Errno::INTR) => {
                     if !self.ready(PollFlags::OUT, deadline) {
                         return Err(io::ErrorKind::TimedOut.into());
@@ -178,4 +208,90 @@ fn in_time<T: Send + 'static>(
         })?;
     take.recv_timeout(CONNECT_WAIT)
         .unwrap_or_else(|_| Err(io::ErrorKind::TimedOut.into()))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::path::Path;
+
+    use bridge::trace::{Entry, HOST, Reader};
+
+    use super::*;
+    use crate::recording::salvage;
+    use crate::recording::{Drawn, SessionLog};
+    use crate::session::record::{Records, queue};
+
+    fn soon() -> Instant {
+        Instant::now() + Duration::from_secs(5)
+    }
+
+    /// A line whose bytes are written down, its far end, and what was written down.
+    fn line() -> (Line, UnixStream, Records) {
+        let (near, far) = UnixStream::pair().unwrap();
+        let (feed, records) = queue(1);
+        let kept = Kept::new(feed.trace(), Clock::start());
+        let line = Line::over(OwnedFd::from(near)).unwrap();
+        (line.kept(&kept), far, records)
+    }
+
+    /// The bytes of the reads and of the writes, one after the other.
+    fn noted(records: Records, folder: &Path) -> [Vec<Vec<u8>>; 2] {
+        let path = folder.join("line.mcap");
+        let log = SessionLog::create(&path, Drawn::USUAL, Clock::start(), records).unwrap();
+        log.finish();
+        let mut trace = Vec::new();
+        salvage::read(&std::fs::read(&path).unwrap(), |message| {
+            if message.channel.encoding == "gauntlet.trace" {
+                trace.extend_from_slice(&message.data[16..]);
+            }
+        })
+        .unwrap();
+        let mut reader = Reader::new(&trace);
+        let [mut reads, mut writes] = [Vec::new(), Vec::new()];
+        while let Some(entry) = reader.read().unwrap() {
+            match entry {
+                Entry::Read { port: HOST, bytes } => reads.push(bytes.to_vec()),
+                Entry::Write { port: HOST, bytes } => writes.push(bytes.to_vec()),
+                _ => {}
+            }
+        }
+        [reads, writes]
+    }
+
+    #[test]
+    fn bytes_that_are_there_together_are_read_together_and_come_one_by_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut line, mut far, records) = line();
+        far.write_all(&[7; 300]).unwrap();
+        far.write_all(&[8; 100]).unwrap();
+        for place in 0..400 {
+            let byte = line.byte(soon()).unwrap();
+            assert_eq!(byte, Some(if place < 300 { 7 } else { 8 }), "{place}");
+        }
+        assert_eq!(line.byte(Instant::now()).unwrap(), None);
+        far.write_all(&[9]).unwrap();
+        assert_eq!(line.byte(soon()).unwrap(), Some(9));
+        drop(far);
+        assert!(line.byte(soon()).is_err());
+        let [reads, _] = noted(records, folder.path());
+        assert_eq!(reads.len(), 2, "one call of the system each");
+        assert_eq!(reads.concat().len(), 401);
+    }
+
+    #[test]
+    fn of_a_write_that_is_not_taken_whole_a_log_has_what_was_taken() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut line, mut far, records) = line();
+        let all = vec![5; 8 << 20];
+        // The far side takes nothing until this has failed.
+        let soon = Instant::now() + Duration::from_millis(50);
+        assert!(line.write(&all, soon).is_err());
+        drop(line);
+        let mut came = Vec::new();
+        far.read_to_end(&mut came).unwrap();
+        assert!(!came.is_empty() && came.len() < all.len());
+        let [_, writes] = noted(records, folder.path());
+        assert_eq!(writes.concat().len(), came.len());
+    }
 }

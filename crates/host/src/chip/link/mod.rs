@@ -189,15 +189,15 @@ impl HostLink {
         deadline: Instant,
         enough: impl Fn(&Self) -> bool,
     ) -> Result<Option<Reply>, Error> {
-        let mut byte = [0];
         while !enough(self) && Instant::now() < deadline {
             let line = self.line.as_mut().ok_or(Error::Lost)?;
-            match line.read(&mut byte, deadline) {
-                Ok(0) => return Ok(None),
-                Ok(_) => self.heard.bytes = self.heard.bytes.saturating_add(1),
+            let byte = match line.byte(deadline) {
+                Ok(None) => return Ok(None),
+                Ok(Some(byte)) => byte,
                 Err(_) => return Err(self.lose()),
-            }
-            let message = self.decoder.push(byte[0], |message| {
+            };
+            self.heard.bytes = self.heard.bytes.saturating_add(1);
+            let message = self.decoder.push(byte, |message| {
                 postcard::from_bytes(message).map_err(|_| framed_bytes(message).ok())
             });
             match message {
