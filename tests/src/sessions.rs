@@ -25,12 +25,9 @@ use rig::{Clock, MemoryWire};
 use crate::images;
 use crate::nor_slot::NorSlot;
 pub use world::Acts;
-use world::{Machine, Wire, World};
+use world::{AXES, Machine, READY, Wire, World};
 
-const AXES: usize = 4;
 const BAUD: u32 = 115_200;
-/// The gripper is up and the glove was calibrated by then, µs.
-const READY: u64 = 12_000_000;
 
 /// When the log of a session is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

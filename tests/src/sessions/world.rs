@@ -13,8 +13,11 @@ use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
 use rig::{Clock, MemoryWire};
 
-use super::{AXES, READY};
 use crate::nor_slot::NorSlot;
+
+pub(super) const AXES: usize = 4;
+/// The gripper is up and the glove was calibrated by then, µs.
+pub(super) const READY: u64 = 12_000_000;
 
 /// A step of the loop costs so much at least and at most, µs.
 const STEP: std::ops::Range<u64> = 20..400;

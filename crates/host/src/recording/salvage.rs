@@ -3,34 +3,25 @@
 mod counted;
 mod end;
 mod frames;
+mod told;
 
 use std::collections::BTreeMap;
 use std::ops::Range;
 
 use mcap::MAGIC;
-use mcap::records::{self, MessageHeader, Record, op};
+use mcap::records::{MessageHeader, Record, op};
+
+pub use told::{Channel, Damage};
 
 use counted::Counted;
 use end::End;
 use frames::{CRC, Sum, chunk, framed, is_proved, parsed, printable};
+use told::channel_of;
 
 /// How many times its length a damaged file is looked through at most.
 const SEARCH: usize = 8;
 /// Damage that is named; what comes after it is put together.
 const NAMED: usize = 1_000;
-
-/// One channel of a log.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Channel {
-    /// Its topic.
-    pub topic: String,
-    /// How its messages are coded: `json`, `protobuf`, `cdr`, `gauntlet.trace`.
-    pub encoding: String,
-    /// The schema's name; empty without one.
-    pub schema: String,
-    /// What the channel says besides.
-    pub metadata: BTreeMap<String, String>,
-}
 
 /// One message.
 #[derive(Debug, Clone, Copy)]
@@ -43,22 +34,6 @@ pub struct Message<'f> {
     pub publish_time: u64,
     /// Its bytes.
     pub data: &'f [u8],
-}
-
-/// Something in a log that cannot be read.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Damage {
-    /// Bytes of the file.
-    pub bytes: Range<usize>,
-    /// What is wrong there.
-    pub what: String,
-}
-
-impl std::fmt::Display for Damage {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let Range { start, end } = self.bytes;
-        write!(f, "bytes {start} to {end}: {}", self.what)
-    }
 }
 
 /// What was found in a log.
@@ -120,16 +95,6 @@ struct Reading<'f, 'e> {
     index: BTreeMap<u16, Vec<(u64, u64)>>,
     /// The sum over the data so far, and how far that is.
     sum: (Sum, usize),
-}
-
-/// A channel, whose schema is one of these.
-fn channel_of(channel: records::Channel, schemas: &BTreeMap<u16, String>) -> Channel {
-    Channel {
-        topic: channel.topic,
-        encoding: channel.message_encoding,
-        schema: schemas.get(&channel.schema_id).cloned().unwrap_or_default(),
-        metadata: channel.metadata,
-    }
 }
 
 impl<'f, 'e> Reading<'f, 'e> {

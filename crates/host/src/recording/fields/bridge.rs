@@ -7,7 +7,7 @@ use super::{axis_names, field, named, numbers, object, time_field};
 use crate::session::record::{Sort, Told};
 
 /// `/bridge/telemetry`.
-pub(in crate::recording) fn telemetry(told: &Told) -> Value {
+pub fn telemetry(told: &Told) -> Value {
     let sample = &told.sample;
     let mut fields = Map::new();
     fields.insert("time_us".to_owned(), json!(told.at.as_ticks()));
@@ -32,7 +32,7 @@ pub(in crate::recording) fn telemetry(told: &Told) -> Value {
     Value::Object(fields)
 }
 
-pub(in crate::recording) fn telemetry_schema(axes: usize) -> Value {
+pub fn telemetry_schema(axes: usize) -> Value {
     let by_axis = |name: &str, what: &str| (name.to_owned(), numbers(axis_names(axes), what));
     object(
         "what a bridge on a chip tells of itself",
@@ -66,7 +66,7 @@ pub(in crate::recording) fn telemetry_schema(axes: usize) -> Value {
 }
 
 /// `/bridge/rates`.
-pub(in crate::recording) fn rates(time_us: u64, rates: &Rates) -> Value {
+pub fn rates(time_us: u64, rates: &Rates) -> Value {
     let mut fields = Map::new();
     let known = [
         ("frames_hz", Some(rates.frames_hz)),
@@ -82,7 +82,7 @@ pub(in crate::recording) fn rates(time_us: u64, rates: &Rates) -> Value {
     Value::Object(fields)
 }
 
-pub(in crate::recording) fn rates_schema(_: usize) -> Value {
+pub fn rates_schema(_: usize) -> Value {
     object(
         "what came in the last second",
         [
@@ -101,13 +101,13 @@ pub(in crate::recording) fn rates_schema(_: usize) -> Value {
 }
 
 /// `/events`.
-pub(in crate::recording) fn event(time_us: u64, sort: Sort, text: &str) -> Value {
+pub fn event(time_us: u64, sort: Sort, text: &str) -> Value {
     let fault = sort == Sort::Fault;
     let level = if fault { "error" } else { "info" };
     json!({ "time_us": time_us, "level": level, "fault": fault, "text": text })
 }
 
-pub(in crate::recording) fn event_schema(_: usize) -> Value {
+pub fn event_schema(_: usize) -> Value {
     object(
         "something that happened",
         [

@@ -8,7 +8,7 @@ use crate::session::record::Frame;
 use crate::session::snapshot::Headings;
 
 /// `/glove/imu`.
-pub(in crate::recording) fn imu(frame: &Frame) -> Value {
+pub fn imu(frame: &Frame) -> Value {
     let sensors: Map<String, Value> = SEGMENT_NAMES
         .iter()
         .zip(&frame.imus)
@@ -24,7 +24,7 @@ pub(in crate::recording) fn imu(frame: &Frame) -> Value {
     json!({ "time_us": frame.at.as_ticks(), "sequence": frame.sequence, "sensors": sensors })
 }
 
-pub(in crate::recording) fn imu_schema(_: usize) -> Value {
+pub fn imu_schema(_: usize) -> Value {
     let sensor = object(
         "one sensor",
         [
@@ -54,7 +54,7 @@ pub(in crate::recording) fn imu_schema(_: usize) -> Value {
 }
 
 /// The hand's angles of one frame.
-pub(in crate::recording) struct Angles<'a> {
+pub struct Angles<'a> {
     pub sequence: u32,
     /// Whether they are usable.
     pub valid: bool,
@@ -65,7 +65,7 @@ pub(in crate::recording) struct Angles<'a> {
 }
 
 /// `/glove/joint_angles`.
-pub(in crate::recording) fn joint_angles(time_us: u64, hand: &Angles<'_>) -> Value {
+pub fn joint_angles(time_us: u64, hand: &Angles<'_>) -> Value {
     json!({
         "time_us": time_us,
         "sequence": hand.sequence,
@@ -85,7 +85,7 @@ fn held(joints: u32) -> Map<String, Value> {
         .collect()
 }
 
-pub(in crate::recording) fn angles_schema(_: usize) -> Value {
+pub fn angles_schema(_: usize) -> Value {
     object(
         "the joint angles of one scan",
         [
@@ -111,7 +111,7 @@ pub(in crate::recording) fn angles_schema(_: usize) -> Value {
 }
 
 /// `/glove/headings`.
-pub(in crate::recording) fn headings(time_us: u64, headings: &Headings) -> Value {
+pub fn headings(time_us: u64, headings: &Headings) -> Value {
     json!({
         "time_us": time_us,
         "sigma": named(&SEGMENT_NAMES, &headings.sigma),
@@ -119,7 +119,7 @@ pub(in crate::recording) fn headings(time_us: u64, headings: &Headings) -> Value
     })
 }
 
-pub(in crate::recording) fn headings_schema(_: usize) -> Value {
+pub fn headings_schema(_: usize) -> Value {
     let sigma = "how sure the joint's heading is: standard deviation, radians; Infinity where there is none";
     object(
         "the headings between a segment and the one it hangs on",

@@ -8,10 +8,10 @@ use crate::session::snapshot::Status;
 use crate::words;
 
 /// Robotiq's letters of the axes, in the order of the positions; a 2-Finger gripper's only one has finger A's place.
-pub(in crate::recording) const LETTERS: [char; AXES] = ['A', 'B', 'C', 'S'];
+pub const LETTERS: [char; AXES] = ['A', 'B', 'C', 'S'];
 
 /// `/map/output`.
-pub(in crate::recording) fn map_output(frame: &Frame, output: &[f32]) -> Value {
+pub fn map_output(frame: &Frame, output: &[f32]) -> Value {
     json!({
         "time_us": frame.at.as_ticks(),
         "sequence": frame.sequence,
@@ -19,7 +19,7 @@ pub(in crate::recording) fn map_output(frame: &Frame, output: &[f32]) -> Value {
     })
 }
 
-pub(in crate::recording) fn output_schema(axes: usize) -> Value {
+pub fn output_schema(axes: usize) -> Value {
     object(
         "what the map makes of one scan, before filter, limits and rate",
         [
@@ -34,7 +34,7 @@ pub(in crate::recording) fn output_schema(axes: usize) -> Value {
 }
 
 /// `/gripper/command`.
-pub(in crate::recording) fn command(command: &Command) -> Value {
+pub fn command(command: &Command) -> Value {
     let mut fields = Map::new();
     fields.insert("time_us".to_owned(), json!(command.at.as_ticks()));
     fields.extend(command.age_us.map(|age| ("age_us".to_owned(), json!(age))));
@@ -54,7 +54,7 @@ pub(in crate::recording) fn command(command: &Command) -> Value {
     Value::Object(fields)
 }
 
-pub(in crate::recording) fn command_schema(axes: usize) -> Value {
+pub fn command_schema(axes: usize) -> Value {
     let age = field(
         "age_us",
         "integer",
@@ -82,7 +82,7 @@ pub(in crate::recording) fn command_schema(axes: usize) -> Value {
 }
 
 /// `/gripper/status`.
-pub(in crate::recording) fn status(status: &Status) -> Value {
+pub fn status(status: &Status) -> Value {
     let mut fields = Map::new();
     let more = status.more.as_ref();
     fields.insert("time_us".to_owned(), json!(status.stamp.as_ticks()));
@@ -107,7 +107,7 @@ pub(in crate::recording) fn status(status: &Status) -> Value {
     Value::Object(fields)
 }
 
-pub(in crate::recording) fn status_schema(axes: usize) -> Value {
+pub fn status_schema(axes: usize) -> Value {
     let axes = LETTERS.iter().take(axes).flat_map(|letter| {
         [
             field(

@@ -5,10 +5,9 @@ use std::ops::Range;
 
 use mcap::records::MessageHeader;
 
-use super::Channel;
-use super::Damage;
 use super::end::Index;
 use super::frames::printable;
+use super::told::{Channel, Damage};
 
 /// What was read of one channel.
 #[derive(Debug, Clone, Copy)]

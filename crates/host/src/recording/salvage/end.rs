@@ -7,7 +7,7 @@ use mcap::MAGIC;
 use mcap::records::{Record, op};
 
 use super::frames::{CRC, FRAME, framed, parsed};
-use super::{Channel, channel_of};
+use super::told::{Channel, channel_of};
 
 /// The length of the records "data end" and "footer".
 const DATA_END: usize = FRAME + 4;
