@@ -118,11 +118,14 @@ pub fn stalls() -> Result<(), Failure> {
 
 /// Live trainings by the virtual person: ten in honest gloves, a nonsense pair; and the tool killed fifty times while it teaches.
 pub fn teaching() -> Result<(), Failure> {
+    let how = ["--", "--ignored", "--nocapture", "--test-threads", "1"];
     let tests = |which: &[&str]| {
-        let how = ["--", "--ignored", "--nocapture", "--test-threads", "1"];
-        cargo(&[&["test", "--locked", "--package", "gauntlet"], which, &how].concat())
+        let what = ["test", "--locked", "--package", "gauntlet"];
+        cargo(&[&what[..], which, &how[..]].concat())
     };
     step::run("live trainings", &mut tests(&["--lib", "wearer::teaching"]))?;
-    let killed = tests(&["--test", "whole_loop", "killed::"]);
-    step::run("killed while it teaches", &mut { killed })
+    step::run(
+        "killed while it teaches",
+        &mut tests(&["--test", "whole_loop", "killed::"]),
+    )
 }
