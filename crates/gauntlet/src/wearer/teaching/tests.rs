@@ -227,7 +227,10 @@ fn ten_persons_in_honest_gloves_teach_usable_maps() {
     assert!(most(|row| row.off.0) <= 25.0, "a reference pair is far off");
     assert!(median(of(|row| row.off.1)) <= 8.0, "the pairs are far off");
     // Processor seconds: other work on this computer counts little. The starts of the last stage share two processors.
-    assert!(most(|row| row.machine_s) <= 2.0 * 20.0, "the machine is slow");
+    assert!(
+        most(|row| row.machine_s) <= 2.0 * 20.0,
+        "the machine is slow"
+    );
     assert!(most(|row| row.next_pose_s) <= 1.0, "the next pose is late");
 }
 
