@@ -176,7 +176,7 @@ fn write<W: Cut>(
         line.push('\n');
         to.add(&line)?;
         *count += 1;
-        if *count % SYNC_EVERY == 0 {
+        if count.is_multiple_of(SYNC_EVERY) {
             to.file.sync()?;
         }
     }
@@ -346,8 +346,9 @@ mod tests {
             .filter(|k| whole[k - 1] == b'\n')
             .collect();
         // About each line's end, and some places within.
-        let near =
-            |length: &usize| *length % 97 == 0 || ends.iter().any(|end| end.abs_diff(*length) <= 1);
+        let near = |length: &usize| {
+            length.is_multiple_of(97) || ends.iter().any(|end| end.abs_diff(*length) <= 1)
+        };
         for length in (0..=whole.len()).filter(near) {
             std::fs::write(&path, &whole[..length]).unwrap();
             let (rows, poses, more) = PosesFile::go_on(&path, &never).unwrap();
