@@ -31,6 +31,8 @@ pub struct Bindings {
     pub undo: u8,
     /// Ends.
     pub end: u8,
+    /// Takes a pose that is shown, whatever else it means there.
+    pub pedal: Option<u8>,
 }
 
 impl Default for Bindings {
@@ -48,15 +50,17 @@ impl Bindings {
 
     /// Those of some settings.
     pub fn of(settings: &Settings) -> Self {
-        let key = |name: &str, usual: u8| {
+        let bound = |name: &str| {
             let text = settings.value(name).map(|value| value.to_string());
-            text.and_then(|text| keystroke(&text)).unwrap_or(usual)
+            text.and_then(|text| keystroke(&text))
         };
+        let key = |name: &str, usual: u8| bound(name).unwrap_or(usual);
         Self {
             clutch: key("keys.clutch", b' '),
             calibrate: key("keys.calibrate", b'c'),
             undo: key("keys.undo", b'u'),
             end: key("keys.end", b'q'),
+            pedal: bound("keys.pedal"),
         }
     }
 

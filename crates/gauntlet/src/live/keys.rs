@@ -56,6 +56,8 @@ pub(super) struct Keyboard {
     text: Option<Instant>,
     /// Keys that have no meaning of their own, each pressed by itself: 0 stands for one that sends more than a byte.
     others: Vec<u8>,
+    /// A pedal is one of the others, whatever its key means elsewhere.
+    has_pedal: bool,
 }
 
 impl Keyboard {
@@ -64,6 +66,11 @@ impl Keyboard {
             bindings,
             ..Self::default()
         }
+    }
+
+    /// From now on the pedal's key is one without a meaning of its own.
+    pub(super) fn with_pedal(&mut self) {
+        self.has_pedal = true;
     }
 
     /// Keys pressed since the last call that have no meaning of their own; at most [`OTHERS`].
@@ -151,11 +158,16 @@ impl Keyboard {
             calibrate,
             undo,
             end,
+            pedal,
         } = self.bindings;
         let ends = |byte: &u8| *byte == end || matches!(*byte, ESCAPE | CTRL_D);
         let text = self.text.is_some_and(|until| now < until);
         match typed {
             [] => Vec::new(),
+            [byte] if self.has_pedal && Some(*byte) == pedal => {
+                self.other(0);
+                Vec::new()
+            }
             [byte] if ends(byte) => vec![Key::End],
             [byte] if *byte == clutch && text => vec![Key::Open],
             [byte] if *byte == clutch => vec![Key::Clutch],
@@ -233,6 +245,7 @@ mod tests {
             calibrate: b'f',
             undo: b'z',
             end: b'.',
+            pedal: None,
         };
         for (bytes, key) in [
             (&b"x"[..], &[Key::Clutch][..]),
@@ -249,6 +262,31 @@ mod tests {
             let mut keys = Keyboard::new(bindings);
             assert_eq!(keys.meaning(bytes, Instant::now()), key, "{bytes:?}");
         }
+    }
+
+    #[test]
+    fn a_pedal_takes_poses_whatever_its_key_means_and_elsewhere_it_means_that() {
+        for pedal in [b'r', b's', b'+'] {
+            let bindings = Bindings {
+                pedal: Some(pedal),
+                ..Bindings::default()
+            };
+            let (mut keys, now) = (Keyboard::new(bindings), Instant::now());
+            keys.with_pedal();
+            for step in 0..3 {
+                let at = now + Duration::from_millis(step * 400);
+                assert_eq!(keys.meaning(&[pedal], at), [], "{pedal}");
+                assert_eq!(keys.others(), [0], "{pedal}");
+            }
+            // It is no text: the clutch's key after it is the clutch's.
+            assert_eq!(keys.meaning(b" ", now), [Key::Clutch]);
+        }
+        let bindings = Bindings {
+            pedal: Some(b'r'),
+            ..Bindings::default()
+        };
+        let mut keys = Keyboard::new(bindings);
+        assert_eq!(keys.meaning(b"r", Instant::now()), [Key::Again]);
     }
 
     #[test]

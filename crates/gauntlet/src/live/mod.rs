@@ -180,6 +180,13 @@ impl Live {
         })
     }
 
+    /// From now on the pedal that this person has is a key without a meaning of its own: see [`Live::others`].
+    pub fn with_pedal(&mut self) {
+        if let Target::Drawn(drawn) = &mut self.target {
+            drawn.keyboard.with_pedal();
+        }
+    }
+
     /// Whether keys can be read.
     pub fn interactive(&self) -> bool {
         matches!(self.target, Target::Drawn(_))

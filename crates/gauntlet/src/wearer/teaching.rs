@@ -1,7 +1,7 @@
 //! A whole live training by the virtual person, on the virtual clock: with the person's bare joint angles, or through every byte of an
 //! honest glove.
 
-use std::time::{Duration as Time, Instant as Here};
+use std::time::Duration as Time;
 
 use anyhow::Result;
 use host::glove::calibration::Bound;
@@ -13,6 +13,7 @@ use host::trainer::hand::Space;
 use rig::glove::VirtualGlove;
 use rig::person::{Attitude, Playing, Task};
 use rig::{Clock, MemoryWire, PoseSource};
+use rustix::time::{ClockId, clock_gettime};
 
 use super::{Wearer, mimicked};
 use crate::played::source;
@@ -22,7 +23,7 @@ use host::lines::port::BAUD;
 use host::report::Nobody;
 use host::scanning::{Flat, Hand, Scanned};
 use host::teaching::kept::{Kept, load_pairs, matrices};
-use host::teaching::{Act, Aim, Free, News, State, Taught, Teaching};
+use host::teaching::{Act, Aim, Earlier, Free, News, State, Taught, Teaching};
 use host::training::Course;
 use host::training::judgement::Judgement;
 use host::training::lessons::{Finished, Lessons};
@@ -192,7 +193,7 @@ pub struct Came {
     pub refused: usize,
     /// How long the person took, s of its time.
     pub person_s: f64,
-    /// The longest time from a pose taken to the next, s here.
+    /// The longest time from a pose taken to the next, processor seconds here.
     pub next_pose_s: f64,
 }
 
@@ -206,7 +207,7 @@ impl Lived {
         let end = body.now() + LONGEST;
         while !free.is_over() && body.now() < end {
             if let Some((at, angles)) = body.step() {
-                free.take(&angles, at);
+                let _ = free.take(&angles, at);
             }
             free.pass(body.now());
         }
@@ -241,13 +242,16 @@ impl Lived {
         stops: &mut dyn FnMut(&Teaching) -> bool,
     ) -> Result<Came> {
         let aim = Aim::Gripper(self.space);
-        let earlier = match kept.pairs.exists() {
-            true => load_pairs(&kept.pairs, &aim)?,
-            false => Vec::new(),
+        let earlier = Earlier {
+            pairs: match kept.pairs.exists() {
+                true => load_pairs(&kept.pairs, &aim)?,
+                false => Vec::new(),
+            },
+            passed_over: kept.load_passed_over(&aim)?,
         };
         let begun = body.now();
         let mut teaching = Teaching::new(aim, self.rounds, earlier, begun);
-        let (mut refused, mut slowest) = (0, Time::ZERO);
+        let mut slowest = Time::ZERO;
         loop {
             while let Some(news) = teaching.next_news() {
                 match news {
@@ -255,17 +259,17 @@ impl Lived {
                     News::Taken(_) | News::Changed(_) => {
                         kept.keep_pairs(teaching.pairs(), teaching.aim())?;
                     }
+                    News::PassedOver => kept.keep_passed_over(teaching.passed_over())?,
                     News::Refused(doubt) => {
-                        refused += 1;
-                        if doubt.may_insist() && refused > 3 {
+                        if doubt.may_insist() && teaching.counts().refused > 3 {
                             teaching.act(Act::Skip, body.now());
                         }
                     }
                     News::Learn(wanted) => {
-                        let began = Here::now();
+                        let began = worked();
                         let lesson =
                             lessons.next(&wanted.start, &wanted.taught, &wanted.passed_over)?;
-                        slowest = slowest.max(began.elapsed());
+                        slowest = slowest.max(worked().saturating_sub(began));
                         teaching.learned(wanted.number, lesson.target, body.now());
                     }
                     News::Complete => teaching.act(Act::Finish, body.now()),
@@ -285,7 +289,7 @@ impl Lived {
         }
         Ok(Came {
             pairs: teaching.pairs().to_vec(),
-            refused,
+            refused: teaching.counts().refused,
             person_s: seconds(body.now()) - seconds(begun),
             next_pose_s: slowest.as_secs_f64(),
         })
@@ -321,6 +325,16 @@ impl Lived {
         let judgement = Judgement::of(map, &motion.frames(), pairs.as_ref(), quality);
         Ok((finished, judgement))
     }
+}
+
+/// What this program has worked so far, of all its threads: with one at work it is the time that a quiet computer takes, however much else
+/// this one has to do.
+fn worked() -> Time {
+    let time = clock_gettime(ClockId::ProcessCPUTime);
+    Time::new(
+        u64::try_from(time.tv_sec).unwrap_or(0),
+        u32::try_from(time.tv_nsec).unwrap_or(0),
+    )
 }
 
 fn seconds(at: Instant) -> f64 {

@@ -172,12 +172,17 @@ impl Bench {
 
     /// The commands of the finished log.
     pub fn commands(&self) -> Vec<serde_json::Value> {
+        self.logged("/gripper/command")
+    }
+
+    /// What the finished log has of a topic.
+    pub fn logged(&self, topic: &str) -> Vec<serde_json::Value> {
         let bytes = std::fs::read(&self.log).unwrap();
         assert!(mcap::Summary::read(&bytes).unwrap().is_some(), "no index");
         mcap::MessageStream::new(&bytes)
             .unwrap()
             .map(Result::unwrap)
-            .filter(|message| message.channel.topic == "/gripper/command")
+            .filter(|message| message.channel.topic == topic)
             .map(|message| serde_json::from_slice(&message.data).unwrap())
             .collect()
     }

@@ -17,6 +17,7 @@ mod ends;
 mod ends_judged;
 mod every_gripper;
 mod kept_log;
+mod killed;
 mod log_cost;
 mod own_faults;
 mod page;

@@ -246,6 +246,14 @@ fn one_page_holds_the_clutch_and_closing_it_opens_the_clutch_which_nobody_else_h
     let shown = reached(&holder);
     let truth = f64::from(bench.gripper.positions()[0]);
     assert!((shown - truth).abs() < 60.0, "{shown} {truth}");
+    // Kept to be found in the log, once there is one.
+    let mut seen = Vec::new();
+    for _ in 0..12 {
+        let number = holder.number;
+        holder.until_holding("the next picture", |page| page.number > number);
+        seen.push(reached(&holder));
+    }
+    seen.dedup();
     assert_eq!(
         holder.picture["gripper"]["reached"]
             .as_array()
@@ -285,6 +293,18 @@ fn one_page_holds_the_clutch_and_closing_it_opens_the_clutch_which_nobody_else_h
         Some("the program has ended")
     );
     ends_soon(&mut running.0);
+    // The page's numbers are the log's, one after the other.
+    let positions = bench.logged("/gripper/status");
+    let mut logged = positions
+        .iter()
+        .filter_map(|status| status["gPOA"].as_f64());
+    for number in &seen {
+        let is_there = logged.any(|logged| logged == *number);
+        assert!(
+            is_there,
+            "{number} of {seen:?} is not in the log, or not then"
+        );
+    }
 }
 
 #[test]

@@ -10,11 +10,13 @@ use std::thread::JoinHandle;
 use anyhow::Result;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES};
 
-use crate::failure::OrFail;
+use crate::failure::{Failure, OrFail};
 use crate::interrupt::Interrupt;
 
 /// Rows that may wait for the disk: ten seconds at least.
 const QUEUE: usize = 1024;
+/// After so many rows the disk has them, too: a power cut costs two seconds of a usual glove.
+const SYNC_EVERY: u64 = 64;
 
 /// One pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,6 +31,8 @@ pub struct Row {
 #[derive(Debug)]
 pub struct PosesFile {
     path: PathBuf,
+    /// There was something in it before.
+    goes_on: bool,
     writer: JoinHandle<(u64, std::io::Result<()>)>,
 }
 
@@ -41,18 +45,50 @@ impl PosesFile {
     pub fn create<T: Send + 'static>(
         path: &Path,
         interrupt: &Interrupt,
-        mut row: impl FnMut(T) -> Option<Row> + Send + 'static,
+        row: impl FnMut(T) -> Option<Row> + Send + 'static,
     ) -> Result<(Self, SyncSender<T>)> {
         let name = || format!("the poses file {}", path.display());
         let file = File::create_new(path)
             .or_fail(name, "a new file's name, in a folder that you may write to")?;
+        Self::write_to(file, path, interrupt, row)
+    }
+
+    /// Goes on with the file of a recording that ended, also by a power cut in a row: that one is cut off. The rows it has, and where more
+    /// go.
+    ///
+    /// # Errors
+    /// A failure that names the file, and the line that is no row.
+    pub fn go_on(path: &Path, interrupt: &Interrupt) -> Result<(Vec<Row>, Self, SyncSender<Row>)> {
+        let name = || format!("the poses file {}", path.display());
+        let next = "a file that you may read and write";
+        let text = std::fs::read(path).or_fail(name, next)?;
+        let length = text
+            .iter()
+            .rposition(|byte| *byte == b'\n')
+            .map_or(0, |end| end + 1);
+        let rows = rows_of(&text[..length], path)?;
+        let file = File::options().append(true).open(path);
+        let file = file.or_fail(name, next)?;
+        file.set_len(length as u64).or_fail(name, next)?;
+        let (file, sender) = Self::write_to(file, path, interrupt, Some)?;
+        Ok((rows, file, sender))
+    }
+
+    fn write_to<T: Send + 'static>(
+        file: File,
+        path: &Path,
+        interrupt: &Interrupt,
+        mut row: impl FnMut(T) -> Option<Row> + Send + 'static,
+    ) -> Result<(Self, SyncSender<T>)> {
+        let name = || format!("the poses file {}", path.display());
+        let length = file.metadata().or_fail(name, "the same again")?.len();
         let (sender, given) = sync_channel(QUEUE);
         let interrupt = interrupt.clone();
         let writer = std::thread::Builder::new()
             .spawn(move || {
                 let mut count = 0;
                 let rows = given.iter().filter_map(&mut row);
-                let mut whole = Whole { file, length: 0 };
+                let mut whole = Whole { file, length };
                 let written = write(&mut whole, rows, &mut count);
                 let written = written.and_then(|()| whole.file.sync_all());
                 if written.is_err() {
@@ -63,6 +99,7 @@ impl PosesFile {
             .or_fail(name, "ending other programs")?;
         let poses = Self {
             path: path.to_owned(),
+            goes_on: length > 0,
             writer,
         };
         Ok((poses, sender))
@@ -76,7 +113,7 @@ impl PosesFile {
         if count > 0 && written.is_ok() && !self.path.exists() {
             written = Err(std::io::Error::other("another program removed it"));
         }
-        if count == 0 {
+        if count == 0 && !self.goes_on {
             let _ = std::fs::remove_file(&self.path);
         }
         let name = || format!("the poses file {}", self.path.display());
@@ -87,11 +124,17 @@ impl PosesFile {
 /// What can be cut back.
 trait Cut: Write {
     fn cut(&mut self, length: u64) -> std::io::Result<()>;
+    /// What is in it stays, also after a power cut.
+    fn sync(&mut self) -> std::io::Result<()>;
 }
 
 impl Cut for File {
     fn cut(&mut self, length: u64) -> std::io::Result<()> {
         self.set_len(length)
+    }
+
+    fn sync(&mut self) -> std::io::Result<()> {
+        self.sync_data()
     }
 }
 
@@ -119,7 +162,9 @@ fn write<W: Cut>(
     rows: impl Iterator<Item = Row>,
     count: &mut u64,
 ) -> std::io::Result<()> {
-    to.add(&format!("time_s,{}\n", JOINT_NAMES.join(",")))?;
+    if to.length == 0 {
+        to.add(&header())?;
+    }
     let mut line = String::new();
     for row in rows {
         line.clear();
@@ -131,8 +176,41 @@ fn write<W: Cut>(
         line.push('\n');
         to.add(&line)?;
         *count += 1;
+        if count.is_multiple_of(SYNC_EVERY) {
+            to.file.sync()?;
+        }
     }
     Ok(())
+}
+
+fn header() -> String {
+    format!("time_s,{}\n", JOINT_NAMES.join(","))
+}
+
+/// The rows of a file as [`write`] writes it; without a line there are none.
+fn rows_of(text: &[u8], path: &Path) -> Result<Vec<Row>> {
+    let wrong = |line: usize, what: &str| {
+        let what = format!("{}, line {line}: {what}", path.display());
+        Failure::new(what, "the poses file that a session began and did not end")
+    };
+    let text = std::str::from_utf8(text).map_err(|_| wrong(1, "no text"))?;
+    if !text.is_empty() && !text.starts_with(&header()) {
+        return Err(wrong(1, "not time_s and the 25 joints").into());
+    }
+    let row = |line: &str| {
+        let mut values = line.split(',');
+        let time: f64 = values.next()?.parse().ok()?;
+        let angles = values.map(|value| value.parse().ok().filter(|angle: &f32| angle.is_finite()));
+        let angles: Vec<f32> = angles.collect::<Option<_>>()?;
+        let is_time = (0.0..1e9).contains(&time);
+        is_time.then_some(Row {
+            at_us: (time * 1e6).round() as u64,
+            angles: angles.try_into().ok()?,
+        })
+    };
+    let lines = text.lines().enumerate().skip(1);
+    let rows = lines.map(|(k, line)| row(line).ok_or_else(|| wrong(k + 1, "no pose").into()));
+    rows.collect()
 }
 
 #[cfg(test)]
@@ -204,6 +282,10 @@ mod tests {
             self.holds.truncate(length as usize);
             Ok(())
         }
+
+        fn sync(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
     }
 
     #[test]
@@ -247,6 +329,48 @@ mod tests {
     }
 
     #[test]
+    fn a_recording_that_ended_anywhere_goes_on_after_its_last_whole_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("poses.csv");
+        let never = Interrupt::never().unwrap();
+        let row = |k: u64| Row {
+            at_us: 28_000 * k,
+            angles: std::array::from_fn(|joint| 0.1 * k as f32 - joint as f32 / 3.0),
+        };
+        let (poses, rows) = PosesFile::create(&path, &never, Some::<Row>).unwrap();
+        (0..5).for_each(|k| rows.send(row(k)).unwrap());
+        drop(rows);
+        assert_eq!(poses.finish().0, 5);
+        let whole = std::fs::read(&path).unwrap();
+        let ends: Vec<usize> = (1..=whole.len())
+            .filter(|k| whole[k - 1] == b'\n')
+            .collect();
+        // About each line's end, and some places within.
+        let near = |length: &usize| {
+            length.is_multiple_of(97) || ends.iter().any(|end| end.abs_diff(*length) <= 1)
+        };
+        for length in (0..=whole.len()).filter(near) {
+            std::fs::write(&path, &whole[..length]).unwrap();
+            let (rows, poses, more) = PosesFile::go_on(&path, &never).unwrap();
+            let count = ends
+                .iter()
+                .filter(|end| **end <= length)
+                .count()
+                .saturating_sub(1);
+            let kept: Vec<Row> = (0..count as u64).map(row).collect();
+            assert_eq!(rows, kept, "{length}");
+            (rows.len() as u64..5).for_each(|k| more.send(row(k)).unwrap());
+            drop(more);
+            poses.finish().1.unwrap();
+            assert_eq!(std::fs::read(&path).unwrap(), whole, "{length}");
+        }
+        std::fs::write(&path, "a,b\n1,2\n").unwrap();
+        let other = PosesFile::go_on(&path, &never).unwrap_err().to_string();
+        assert!(other.contains("poses.csv, line 1: not time_s"), "{other}");
+        assert_eq!(std::fs::read(&path).unwrap(), b"a,b\n1,2\n", "touched");
+    }
+
+    #[test]
     fn a_file_that_another_program_removed_is_told() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("poses.csv");
@@ -268,6 +392,7 @@ mod tests {
         let full = || Err(std::io::Error::from(std::io::ErrorKind::StorageFull));
         let poses = PosesFile {
             path: "/nowhere/hand.csv".into(),
+            goes_on: false,
             writer: std::thread::spawn(move || (3, full())),
         };
         let (count, written) = poses.finish();

@@ -187,6 +187,12 @@ pub const KEYS: &[Key] = &[
         "\"u\"",
         "Takes the newest flat pose back that was asked for.",
     ),
+    open(
+        "keys.pedal",
+        Kind::Key,
+        "\"s\"",
+        "What a pedal sends: in train --live it takes the pose, whatever else that key means there.",
+    ),
     key(
         "keys.end",
         Kind::Key,

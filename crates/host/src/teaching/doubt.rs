@@ -28,7 +28,7 @@ pub enum Doubt {
         /// Its angle, radians.
         angle: f32,
     },
-    /// No scan of the whole hand came in time.
+    /// No scan of the whole hand came since the pose was asked.
     Unseen,
 }
 
@@ -57,7 +57,9 @@ impl fmt::Display for Doubt {
                     high.to_degrees()
                 )
             }
-            Self::Unseen => f.write_str("the glove shows no whole hand now: wait until it does"),
+            Self::Unseen => f.write_str(
+                "the glove has shown no whole hand since this was asked: wait until it does",
+            ),
         }
     }
 }

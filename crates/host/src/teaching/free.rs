@@ -6,6 +6,7 @@ use glove::hand::JOINT_COUNT;
 use glove::{Duration, Instant};
 
 use crate::clock::{since, ticks};
+use crate::recording::poses::Row;
 use crate::training::movements::{Movement, Movements};
 use crate::training::prompts::{GUIDED, Prompt, again};
 
@@ -13,6 +14,12 @@ use crate::training::prompts::{GUIDED, Prompt, again};
 const PACE: f64 = 0.75;
 /// Rows that are kept at most: ten minutes of the fastest glove.
 const MOST_ROWS: usize = 100_000;
+
+/// Between the last pose of a session that ended and the first of the one that goes on, µs: in less a hand does not get from one pose to
+/// any other.
+const BETWEEN_US: u64 = 1_000_000;
+/// A movement of which less than this is left is over, µs.
+const OVER_US: u64 = 500_000;
 
 /// What is asked now.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +47,9 @@ pub struct Free {
     started: Instant,
     repeats: bool,
     movements: Movements,
-    rows: Vec<(Instant, [f32; JOINT_COUNT])>,
+    /// On the clock of the rows, when it was started.
+    started_us: u64,
+    rows: Vec<Row>,
 }
 
 impl Free {
@@ -53,16 +62,59 @@ impl Free {
             started: now,
             repeats: false,
             movements: Movements::default(),
+            started_us: 0,
             rows: Vec::new(),
         }
     }
 
-    /// Takes a scan of the whole hand, radians.
-    pub fn take(&mut self, angles: &[f32; JOINT_COUNT], at: Instant) {
-        if self.rows.len() < MOST_ROWS && !self.is_over() {
-            self.movements.take(angles);
-            self.rows.push((at, *angles));
+    /// Goes on now after the rows of a session that ended: the movement in which it did is asked anew.
+    pub fn going_on(rows: Vec<Row>, now: Instant) -> Self {
+        let mut free = Self::new(now);
+        let Some(last) = rows.last().map(|row| row.at_us) else {
+            return free;
+        };
+        // On the rows' clock: when a movement began, and the row before.
+        let (mut began, mut before) = (0, 0);
+        for row in &rows {
+            if row.at_us >= before + BETWEEN_US {
+                began = row.at_us;
+            }
+            began = free.pass_to(row.at_us, began, now);
+            free.movements.take(&row.angles);
+            before = row.at_us;
         }
+        free.pass_to(last + OVER_US, began, now);
+        free.rows = rows;
+        free.started_us = last + BETWEEN_US;
+        free
+    }
+
+    /// Past the movements that are over at `at_us`, of which the first began at `began`: when the one then began.
+    fn pass_to(&mut self, at_us: u64, mut began: u64, now: Instant) -> u64 {
+        while let Some(prompt) = self.prompts.get(self.place) {
+            let end = began + ticks(prompt.time).as_ticks();
+            if end > at_us {
+                break;
+            }
+            began = end;
+            self.go_on(now);
+        }
+        began
+    }
+
+    /// Takes a scan of the whole hand, radians. The row that it became; none where there are enough, or it is no newer.
+    pub fn take(&mut self, angles: &[f32; JOINT_COUNT], at: Instant) -> Option<Row> {
+        let row = Row {
+            at_us: self.started_us + since(at, self.started).as_ticks(),
+            angles: *angles,
+        };
+        let is_newer = (self.rows.last()).is_none_or(|last| last.at_us < row.at_us);
+        if self.rows.len() >= MOST_ROWS || self.is_over() || !is_newer {
+            return None;
+        }
+        self.movements.take(angles);
+        self.rows.push(row);
+        Some(row)
     }
 
     /// Time passes. Whether something new is asked.
@@ -121,8 +173,8 @@ impl Free {
         since(now, self.started)
     }
 
-    /// The poses, with their times from the first on.
-    pub fn rows(&self) -> &[(Instant, [f32; JOINT_COUNT])] {
+    /// The poses.
+    pub fn rows(&self) -> &[Row] {
         &self.rows
     }
 }
@@ -141,6 +193,42 @@ mod tests {
     use trainer::hand::motion::Generator;
 
     #[test]
+    fn it_goes_on_with_the_movement_in_which_it_ended_and_is_over_where_it_was() {
+        let generator = Generator::new(&LIMITS, 2);
+        let at = |us: u64| Instant::from_ticks(us);
+        let mut free = Free::new(at(0));
+        let mut now = 0;
+        let mut play = |free: &mut Free, until: u64| {
+            while now < until && !free.is_over() {
+                now += 28_000;
+                let _ = free.take(&generator.pose_at(now as f64 * 1e-6), at(now));
+                free.pass(at(now));
+            }
+        };
+        play(&mut free, 20_000_000);
+        let (rows, asked) = (
+            free.rows().to_vec(),
+            free.ask(at(20_000_000)).unwrap().number,
+        );
+        // Other programs, each from the beginning of that movement, killed again before its end.
+        let mut again = Free::going_on(rows.clone(), at(20_000_000));
+        for until in [21_000_000, 22_000_000, 23_000_000, 200_000_000] {
+            let ask = again.ask(at(until - 1_000_000)).unwrap();
+            assert_eq!(ask.number, asked, "{until}");
+            play(&mut again, until);
+            if until < 200_000_000 {
+                again = Free::going_on(again.rows().to_vec(), at(until));
+            }
+        }
+        assert!(asked > 2);
+        assert_eq!(again.rows()[..rows.len()], rows);
+        let times: Vec<u64> = again.rows().iter().map(|row| row.at_us).collect();
+        assert!(times.windows(2).all(|two| two[0] < two[1]));
+        let over = Free::going_on(again.rows().to_vec(), at(0));
+        assert!(over.is_over(), "{:?}", over.ask(at(0)));
+    }
+
+    #[test]
     fn it_lasts_a_minute_and_asks_again_for_what_was_not_seen() {
         let played = |still: bool| {
             let generator = Generator::new(&LIMITS, 2);
@@ -154,7 +242,7 @@ mod tests {
                 } else {
                     generator.pose_at(t)
                 };
-                free.take(&angles, now);
+                let _ = free.take(&angles, now);
                 free.pass(now);
             }
             (free.lasted(now).as_ticks() as f64 * 1e-6, free)

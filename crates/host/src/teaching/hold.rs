@@ -85,7 +85,8 @@ impl Hold {
         }
     }
 
-    /// The hand as it is, the mean of the last moments: for a key that takes it at once.
+    /// The hand as it is, the mean of the last moments since the pose was asked: for a key that takes it at once. What the hand did
+    /// before is no answer.
     pub fn at_once(&self) -> Option<[f32; JOINT_COUNT]> {
         self.mean(self.recent.back()?.0)
     }
@@ -132,8 +133,9 @@ impl Hold {
     }
 
     fn mean(&self, now: Instant) -> Option<[f32; JOINT_COUNT]> {
+        let is_answer = |at: Instant| self.asked.is_none_or(|asked| at >= asked);
         let counted = self.recent.iter().rev();
-        let counted = counted.take_while(|(at, _)| since(now, *at) <= AVERAGED);
+        let counted = counted.take_while(|(at, _)| since(now, *at) <= AVERAGED && is_answer(*at));
         let mut sum = [0.0_f64; JOINT_COUNT];
         let mut count = 0.0;
         for (_, angles) in counted {
@@ -215,6 +217,17 @@ mod tests {
         };
         let (_, angle) = played(&mut hold, (0, 9_000_000), settles).unwrap();
         assert!((angle - 1.0).abs() < 1e-6, "{angle}");
+    }
+
+    #[test]
+    fn a_key_takes_nothing_of_what_the_hand_did_before_the_pose_was_asked() {
+        let mut hold = asked(0.0);
+        assert_eq!(played(&mut hold, (0, 1_000_000), |_| 0.2), None);
+        hold.ask(at(1_000_000), Some([0.2; JOINT_COUNT]));
+        assert_eq!(hold.at_once(), None, "nothing came since");
+        assert_eq!(played(&mut hold, (1_008_000, 1_100_000), |_| 0.9), None);
+        let taken = hold.at_once().unwrap();
+        assert!((taken[7] - 0.9).abs() < 1e-6, "{}", taken[7]);
     }
 
     #[test]

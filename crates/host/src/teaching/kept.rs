@@ -1,15 +1,17 @@
-//! A session's files beside the model: the free motion and the pairs. Each is there whole or not at all, the pairs after every pair.
+//! A session's files beside the model: the free motion, row by row as it is made; the pairs and what was passed over, each whole or not at
+//! all, after every change.
 
 use std::path::{Path, PathBuf};
 
 use anyhow::Result;
-use glove::Instant;
 use glove::hand::{JOINT_COUNT, JOINT_NAMES};
-use trainer::data::{Columns, Matrix, Pairs, Poses, Table, write_pairs, write_poses};
+use trainer::data::{
+    Columns, Matrix, Pairs, Poses, Table, read_samples, write_pairs, write_poses, write_samples,
+};
 
 use super::aim::{Aim, Taught};
-use crate::clock::since;
 use crate::failure::{Failure, OrFail, told};
+use crate::recording::poses::Row;
 
 /// Where a session's files lie.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -18,30 +20,32 @@ pub struct Kept {
     pub poses: PathBuf,
     /// The pairs.
     pub pairs: PathBuf,
+    /// Targets that were passed over.
+    pub passed_over: PathBuf,
 }
 
 impl Kept {
-    /// Beside a model: `MODEL.poses.csv` and `MODEL.pairs.csv`.
+    /// Beside a model: `MODEL.poses.csv`, `MODEL.pairs.csv` and `MODEL.skipped.csv`.
     pub fn beside(model: &Path) -> Self {
         Self {
             poses: model.with_extension("poses.csv"),
             pairs: model.with_extension("pairs.csv"),
+            passed_over: model.with_extension("skipped.csv"),
         }
     }
 
-    /// Keeps the free motion.
+    /// Keeps the whole free motion.
     ///
     /// # Errors
     /// A failure that names the file.
-    pub fn keep_motion(&self, rows: &[(Instant, [f32; JOINT_COUNT])]) -> Result<()> {
-        let first = rows.first().map_or(Instant::from_ticks(0), |(at, _)| *at);
+    pub fn keep_motion(&self, rows: &[Row]) -> Result<()> {
         let mut poses = Poses {
             time_s: Some(Vec::new()),
             rows: Matrix::default(),
         };
-        for (at, angles) in rows {
-            let time = since(*at, first).as_ticks() as f64 * 1e-6;
-            poses.rows.push(angles);
+        for row in rows {
+            let time = row.at_us as f64 * 1e-6;
+            poses.rows.push(&row.angles);
             poses.time_s.get_or_insert_default().push(time);
         }
         write_poses(&self.poses, &poses, &JOINT_NAMES).map_err(told)
@@ -53,22 +57,53 @@ impl Kept {
     /// A failure that names the file.
     pub fn keep_pairs(&self, pairs: &[Taught], aim: &Aim) -> Result<()> {
         if pairs.is_empty() {
-            return match std::fs::remove_file(&self.pairs) {
-                Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error).or_fail(
-                    || {
-                        format!(
-                            "the pairs file {} cannot be taken away",
-                            self.pairs.display()
-                        )
-                    },
-                    "a folder that you may write in",
-                ),
-                _ => Ok(()),
-            };
+            return take_away(&self.pairs);
         }
         let targets = aim.target_columns();
         let targets: Vec<&str> = targets.iter().map(String::as_str).collect();
         write_pairs(&self.pairs, &matrices(pairs), &JOINT_NAMES, &targets).map_err(told)
+    }
+
+    /// Keeps the targets that were passed over; without one there is no file.
+    ///
+    /// # Errors
+    /// A failure that names the file.
+    pub fn keep_passed_over(&self, targets: &Matrix) -> Result<()> {
+        match targets.rows {
+            0 => take_away(&self.passed_over),
+            _ => write_samples(&self.passed_over, targets, "x").map_err(told),
+        }
+    }
+
+    /// The targets that were passed over, for so many axes.
+    ///
+    /// # Errors
+    /// A failure that names the file and what is wrong with it.
+    pub fn load_passed_over(&self, aim: &Aim) -> Result<Matrix> {
+        if std::fs::symlink_metadata(&self.passed_over).is_err() {
+            return Ok(Matrix::default());
+        }
+        let targets = read_samples(&self.passed_over, "x").map_err(told)?;
+        if targets.cols == aim.axes() {
+            return Ok(targets);
+        }
+        let what = format!(
+            "{} is of a gripper with {} axes, and this one has {}",
+            self.passed_over.display(),
+            targets.cols,
+            aim.axes()
+        );
+        Err(Failure::new(what, "the files of one session; or that one taken away").into())
+    }
+}
+
+fn take_away(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(error).or_fail(
+            || format!("{} cannot be taken away", path.display()),
+            "a folder that you may write in",
+        ),
+        _ => Ok(()),
     }
 }
 
@@ -154,6 +189,18 @@ mod tests {
         kept.keep_pairs(&[], &AIM).unwrap();
         assert!(!kept.pairs.exists());
         kept.keep_pairs(&[], &AIM).unwrap();
+        assert_eq!(kept.load_passed_over(&AIM).unwrap(), Matrix::default());
+        let targets = Matrix::from_rows(&[[3.25, 9.0, 1.0, 2.0]]);
+        kept.keep_passed_over(&targets).unwrap();
+        assert_eq!(kept.load_passed_over(&AIM).unwrap(), targets);
+        let other = kept.load_passed_over(&Aim::Gripper(Space::OneAxis));
+        let why = other.unwrap_err().to_string();
+        assert!(
+            why.contains("model.skipped.csv is of a gripper with 4 axes"),
+            "{why}"
+        );
+        kept.keep_passed_over(&Matrix::default()).unwrap();
+        assert!(!kept.passed_over.exists());
     }
 
     #[test]

@@ -20,4 +20,4 @@ pub use doubt::Doubt;
 pub use free::{Free, FreeAsk};
 pub use hold::{HOLD, Hold, READ, Stage};
 pub use learner::{Learned, Learner, Wanted};
-pub use rounds::{Act, Ask, News, State, Teaching};
+pub use rounds::{Act, Ask, Counts, Earlier, News, State, Teaching};

@@ -15,8 +15,6 @@ use crate::training::lessons::MOST_PAIRS;
 
 /// A pose that was refused may be shown again so much later at the earliest; the words can be read meanwhile.
 const AGAIN: u64 = 1_500_000;
-/// News that wait to be heard. A session of fewer than 100 pairs has fewer at once.
-const MOST_NEWS: usize = 64;
 
 /// What a person does besides moving the hand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,10 +59,43 @@ pub enum News {
     Refused(Doubt),
     /// A pair was taken back or brought back; so many are left. They are to be kept.
     Changed(usize),
+    /// A pose was passed over. What was is to be kept.
+    PassedOver,
     /// The learner is to say what comes next.
     Learn(Wanted),
     /// All pairs are there.
     Complete,
+}
+
+impl News {
+    /// A newer one of the same kind says all that an older one did: what comes next is one of three.
+    fn kind(&self) -> u8 {
+        match self {
+            Self::Asked(_) | Self::Learn(_) | Self::Complete => 0,
+            Self::Taken(_) => 1,
+            Self::Refused(_) => 2,
+            Self::Changed(_) => 3,
+            Self::PassedOver => 4,
+        }
+    }
+}
+
+/// What an earlier session left.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Earlier {
+    /// The pairs, in their order.
+    pub pairs: Vec<Taught>,
+    /// Targets that were passed over.
+    pub passed_over: Matrix,
+}
+
+/// How often something happened that no newer news may hide.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// Poses that were refused.
+    pub refused: usize,
+    /// Pairs that were taken back.
+    pub taken_back: usize,
 }
 
 /// What is asked now.
@@ -98,28 +129,31 @@ pub struct Teaching {
     asked: u64,
     is_waiting: bool,
     finished: bool,
+    counts: Counts,
+    /// What was not heard yet: of each kind the newest.
     news: VecDeque<News>,
 }
 
 impl Teaching {
-    /// A session of `rounds` adaptive pairs after the start poses; `kept`: pairs of an earlier session, in their order.
-    pub fn new(aim: Aim, rounds: usize, kept: Vec<Taught>, now: Instant) -> Self {
+    /// A session of `rounds` adaptive pairs after the start poses, or of as many as `earlier` has.
+    pub fn new(aim: Aim, rounds: usize, earlier: Earlier, now: Instant) -> Self {
         let start = aim.start();
         let mut teaching = Self {
             rounds: rounds
                 .clamp(1, MOST_PAIRS)
-                .max(kept.len().saturating_sub(start.len())),
+                .max(earlier.pairs.len().saturating_sub(start.len())),
             aim,
             start,
-            pairs: kept,
+            pairs: earlier.pairs,
             taken_back: Vec::new(),
-            passed_over: Matrix::default(),
+            passed_over: earlier.passed_over,
             target: None,
             hold: Hold::default(),
             refused: None,
             asked: 0,
             is_waiting: false,
             finished: false,
+            counts: Counts::default(),
             news: VecDeque::new(),
         };
         teaching.go_on(now);
@@ -129,6 +163,16 @@ impl Teaching {
     /// The pairs so far, the start poses first.
     pub fn pairs(&self) -> &[Taught] {
         &self.pairs
+    }
+
+    /// Targets that were passed over.
+    pub fn passed_over(&self) -> &Matrix {
+        &self.passed_over
+    }
+
+    /// What happened so far.
+    pub fn counts(&self) -> Counts {
+        self.counts
     }
 
     /// What is taught.
@@ -170,6 +214,7 @@ impl Teaching {
             Act::Undo => {
                 if let Some(pair) = self.pairs.pop() {
                     self.taken_back.push(pair);
+                    self.counts.taken_back += 1;
                     self.changed(now);
                 }
             }
@@ -183,6 +228,7 @@ impl Teaching {
             Act::Skip if self.pairs.len() >= self.start.len() => {
                 if let Some(target) = self.target.take() {
                     self.passed_over.push(&target);
+                    self.tell(News::PassedOver);
                     self.go_on(now);
                 }
             }
@@ -293,6 +339,7 @@ impl Teaching {
         // The same is said once while the hand goes on showing it.
         if !self.is_pausing(now) {
             self.refused = Some((doubt, now));
+            self.counts.refused += 1;
             self.tell(News::Refused(doubt));
         }
     }
@@ -310,9 +357,8 @@ impl Teaching {
     }
 
     fn tell(&mut self, news: News) {
-        if self.news.len() < MOST_NEWS {
-            self.news.push_back(news);
-        }
+        self.news.retain(|older| older.kind() != news.kind());
+        self.news.push_back(news);
     }
 }
 

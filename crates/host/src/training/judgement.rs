@@ -53,12 +53,9 @@ pub enum Fault {
 }
 
 impl Fault {
-    /// Whether the map may be driven with all the same.
+    /// Whether the map may be driven with all the same: it does what was shown, however odd that was or little.
     pub fn is_doubt(&self) -> bool {
-        matches!(
-            self,
-            Self::Pairs(_) | Self::LittleMotion(_) | Self::Short { .. }
-        )
+        matches!(self, Self::Pairs(Suspect::Odd(_)) | Self::LittleMotion(_))
     }
 
     /// A word for programs.

@@ -18,10 +18,17 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(kept: Vec<Taught>) -> Self {
+    fn new(pairs: Vec<Taught>) -> Self {
+        Self::after(Earlier {
+            pairs,
+            passed_over: Matrix::default(),
+        })
+    }
+
+    fn after(earlier: Earlier) -> Self {
         let now = Instant::from_ticks(0);
         Self {
-            teaching: Teaching::new(Aim::Gripper(Space::ThreeFinger), 2, kept, now),
+            teaching: Teaching::new(Aim::Gripper(Space::ThreeFinger), 2, earlier, now),
             now,
             told: Vec::new(),
         }
@@ -211,4 +218,68 @@ fn a_late_answer_of_the_learner_to_an_older_question_is_passed_over() {
         .teaching
         .learned(wanted.number, Some(vec![7.0; 4]), bench.now);
     assert_eq!(bench.target(), vec![7.0; 4]);
+}
+
+#[test]
+fn a_session_goes_on_without_the_poses_that_were_passed_over() {
+    let mut bench = Bench::new(whole().teaching.pairs()[..2].to_vec());
+    bench.hear();
+    bench.act(Act::Skip);
+    assert!(bench.told.contains(&News::PassedOver));
+    assert_eq!(bench.teaching.passed_over().row(0), TARGETS[0]);
+    let earlier = Earlier {
+        pairs: bench.teaching.pairs().to_vec(),
+        passed_over: bench.teaching.passed_over().clone(),
+    };
+    let mut bench = Bench::after(earlier);
+    bench.hear();
+    assert_eq!(bench.target(), TARGETS[1]);
+}
+
+#[test]
+fn a_pair_more_than_was_planned_is_there_where_the_session_goes_on() {
+    let mut bench = whole();
+    bench.act(Act::More);
+    bench.hold(shown(&TARGETS[2]), 3.5);
+    let pairs = bench.teaching.pairs().to_vec();
+    assert_eq!(pairs.len(), 5);
+    let mut bench = Bench::new(pairs.clone());
+    bench.hear();
+    assert_eq!(bench.teaching.pairs(), pairs);
+    assert_eq!(bench.state(), State::Trying);
+}
+
+#[test]
+fn nobody_listens_for_a_thousand_acts_and_the_newest_is_heard_then_and_every_act_counts() {
+    let mut bench = whole();
+    bench.told.clear();
+    for _ in 0..500 {
+        bench.teaching.act(Act::Undo, bench.now);
+        bench.teaching.act(Act::Redo, bench.now);
+    }
+    bench.teaching.act(Act::Undo, bench.now);
+    assert_eq!(bench.teaching.counts().taken_back, 501);
+    let heard: Vec<News> = std::iter::from_fn(|| bench.teaching.next_news()).collect();
+    let [News::Changed(3), News::Learn(wanted)] = &heard[..] else {
+        panic!("{heard:?}");
+    };
+    // The question is the newest: whoever answers it is understood.
+    let answer = Some(TARGETS[1].to_vec());
+    bench.teaching.learned(wanted.number, answer, bench.now);
+    assert_eq!(bench.target(), TARGETS[1]);
+}
+
+#[test]
+fn a_key_right_after_a_pose_was_asked_takes_nothing_from_before() {
+    let mut bench = Bench::new(Vec::new());
+    bench.hear();
+    let [open, fist] = Space::ThreeFinger.start();
+    bench.hold(shown(open), 3.5);
+    assert_eq!(bench.target(), *fist);
+    bench.now += SCAN;
+    // Asked at once and answered by nothing yet.
+    bench.teaching.act(Act::Undo, bench.now);
+    bench.act(Act::Capture);
+    assert_eq!(bench.told.last(), Some(&News::Refused(Doubt::Unseen)));
+    assert!(bench.teaching.pairs().is_empty());
 }

@@ -190,12 +190,13 @@ fn a_finger_that_never_closes_is_named_with_how_far_it_comes() {
     units[1].1 = 33.0;
     let judgement = judged(&written(&units, BASE), &frames(), None);
     println!("{judgement}");
+    assert!(!judgement.good(), "{judgement}");
     assert!(
-        judgement
-            .to_string()
-            .contains(", but finger B never closes: 1"),
+        judgement.to_string().contains("; finger B never closes: 1"),
         "{judgement}"
     );
+    let named = judgement.named();
+    assert_eq!((named.len(), named[0].kind), (1, "short"));
     assert!(judgement.reach.words().contains("is reached least"));
 }
 
@@ -218,7 +219,7 @@ fn two_pairs_swapped_and_one_nonsense_pair_of_ten_are_pointed_out_by_number() {
             judgement.faults,
             [Fault::Pairs(Suspect::Swapped(a + 1, b + 1))]
         );
-        assert!(judgement.good(), "a doubt: {judgement}");
+        assert!(!judgement.good(), "{judgement}");
     }
     for odd in [2, 5, 8] {
         let nonsense = pairs(|k| if k == odd { (k + 3) % 8 + 1 } else { k });

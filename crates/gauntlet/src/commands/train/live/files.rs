@@ -12,8 +12,9 @@ use crate::tell::Tell;
 use host::failure::{Failure, with_others};
 use host::interrupt::Interrupt;
 use host::next::{Command, NextStep};
+use host::recording::poses::PosesFile;
 use host::teaching::kept::{Kept, load_pairs};
-use host::teaching::{Aim, Taught};
+use host::teaching::{Aim, Earlier, Taught};
 use host::training::motion::Motion;
 
 /// Where they are.
@@ -21,8 +22,8 @@ pub(super) struct Files {
     pub kept: Kept,
     /// The motion is there already.
     given: Option<PathBuf>,
-    /// Pairs of an earlier session.
-    pub earlier: Vec<Taught>,
+    /// What an earlier session left.
+    pub earlier: Earlier,
 }
 
 impl Files {
@@ -32,20 +33,28 @@ impl Files {
         let inputs: Vec<&Path> = inputs.into_iter().flatten().map(PathBuf::as_path).collect();
         outputs::check(&options.out, Kind::Model, &inputs)?;
         let mut kept = Kept::beside(&options.out);
-        let mut earlier = Vec::new();
+        let mut earlier = Earlier::default();
         let mut given = options.poses.clone();
+        let resume = || Command::more().path("--resume", &kept.pairs);
         if let Some(pairs) = &options.resume {
-            earlier = load_pairs(pairs, aim)?;
-            kept.pairs.clone_from(pairs);
-            given = given.or_else(|| Some(kept.poses.clone()));
-        } else {
-            refuse_earlier(&kept.pairs, Command::more().path("--resume", &kept.pairs))?;
-        }
-        match &given {
-            Some(given) => kept.poses.clone_from(given),
-            None => {
-                refuse_earlier(&kept.poses, Command::more().path("--poses", &kept.poses))?;
+            // It may have ended before the first pose, in the free motion.
+            let is_before_poses = given.is_none() && !pairs.exists() && kept.poses.exists();
+            if !is_before_poses {
+                earlier.pairs = load_pairs(pairs, aim)?;
+                given = given.or_else(|| Some(kept.poses.clone()));
             }
+            earlier.passed_over = kept.load_passed_over(aim)?;
+            kept.pairs.clone_from(pairs);
+        } else {
+            refuse_earlier(&kept.pairs, resume())?;
+            if given.is_none() {
+                refuse_earlier(&kept.poses, resume())?;
+            }
+            // What was passed over before pairs that are no more.
+            kept.keep_passed_over(&earlier.passed_over)?;
+        }
+        if let Some(given) = &given {
+            kept.poses.clone_from(given);
         }
         Ok(Self {
             kept,
@@ -63,12 +72,47 @@ impl Files {
         interrupt: &Interrupt,
     ) -> Result<Motion> {
         if self.given.is_none() {
-            let free = worn.moves_freely(options.json, tell, interrupt)?;
-            self.kept.keep_motion(free.rows())?;
+            self.free_motion(worn, options, tell, interrupt)?;
         }
         let motion = Motion::open_for_training(Some(&self.kept.poses), options.seed, &Person)?;
         tell.say(format_args!("poses      {}", motion.describe()));
         Ok(motion)
+    }
+
+    /// What the person does freely, kept row by row.
+    fn free_motion(
+        &self,
+        worn: &mut Worn<'_>,
+        options: &Train,
+        tell: &Tell,
+        interrupt: &Interrupt,
+    ) -> Result<()> {
+        let path = self.poses();
+        let (rows, file, sender) = match path.exists() {
+            true => PosesFile::go_on(path, interrupt)?,
+            false => {
+                let (file, sender) = PosesFile::create(path, interrupt, Some)?;
+                (Vec::new(), file, sender)
+            }
+        };
+        let earlier = rows.len() as u64;
+        let moved = worn.moves_freely(rows, sender, (options.json, tell), interrupt);
+        let (count, written) = file.finish();
+        written?;
+        if moved? {
+            return Ok(());
+        }
+        let what = format!(
+            "ended in the free motion: {} poses of it are kept in {}",
+            earlier + count,
+            path.display()
+        );
+        let more = Command::more().path("--resume", self.pairs());
+        let next = match earlier + count {
+            0 => NextStep::same(Command::more()),
+            _ => NextStep::same(more),
+        };
+        Err(Failure::new(what, next).into())
     }
 
     /// The file of the pairs.

@@ -1,6 +1,7 @@
 //! The hand in the glove: opened, laid flat, moved freely.
 
 use std::path::Path;
+use std::sync::mpsc::{SyncSender, TrySendError};
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -25,6 +26,7 @@ use host::clock::{QuietTime, ticks};
 use host::failure::{Failure, OrFail};
 use host::interrupt::Interrupt;
 use host::next::{Command, NextStep};
+use host::recording::poses::Row;
 use host::scanning::{Flat, Hand, Pose};
 use host::teaching::Free;
 use host::training::recorded::names;
@@ -186,29 +188,37 @@ impl<'a> Worn<'a> {
         Ok(())
     }
 
-    /// A minute of free motion.
-    pub fn moves_freely(&mut self, json: bool, tell: &Tell, interrupt: &Interrupt) -> Result<Free> {
+    /// A minute of free motion, after `rows` of it that are there already; each row goes to `kept`. Whether it went to its end.
+    pub fn moves_freely(
+        &mut self,
+        rows: Vec<Row>,
+        kept: SyncSender<Row>,
+        (json, tell): (bool, &Tell),
+        interrupt: &Interrupt,
+    ) -> Result<bool> {
         let terminal = || "the terminal does not work".to_owned();
         let next = "the same with | cat behind it, which prints lines instead";
         let drawn = !json && out::is_drawn();
         let mut live = Live::start(!drawn).or_fail(terminal, next)?;
-        let mut free = Free::new(self.now());
+        let mut free = Free::going_on(rows, self.now());
         let mut asked = None;
         while !free.is_over() {
             for pose in self.poses()? {
-                free.take(&pose.angles, pose.at);
+                if let Some(row) = free.take(&pose.angles, pose.at) {
+                    // A disk that takes no more asks for the end, and its writer says why.
+                    if let Err(TrySendError::Full(_)) = kept.try_send(row) {
+                        let what = "the disk does not keep up with the free motion";
+                        return Err(Failure::new(what, "--out in another folder").into());
+                    }
+                }
             }
             free.pass(self.now());
             if interrupt.asked() || (!json && out::reader_left()?) {
-                return Err(Failure::interrupted("in the free motion: nothing was kept").into());
+                return Ok(false);
             }
             for key in live.keys().or_fail(terminal, next)? {
                 match key {
-                    Key::End => {
-                        return Err(
-                            Failure::interrupted("in the free motion: nothing was kept").into()
-                        );
-                    }
+                    Key::End => return Ok(false),
                     Key::Clutch | Key::Open => free.go_on(self.now()),
                     Key::Calibrate | Key::Undo | Key::Again => {}
                 }
@@ -240,7 +250,7 @@ impl<'a> Worn<'a> {
                 live.show(view).or_fail(terminal, next)?;
             }
         }
-        Ok(free)
+        Ok(true)
     }
 }
 

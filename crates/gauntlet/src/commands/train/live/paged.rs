@@ -13,6 +13,7 @@ use host::trainer::spread::spread;
 use host::training::quality::MEASURED;
 use host::words::axis_words;
 
+use crate::live::Bindings;
 use crate::live::teach::{Doing, TeachView, count};
 use crate::progress::Person;
 use crate::web::picture::{Action, Axis, Gripper, Guide, Headline, Teach, Tone};
@@ -197,7 +198,7 @@ impl OnPage {
             gripper,
             teach,
             guide,
-            actions: actions(ask),
+            actions: actions(ask, Bindings::load().pedal),
             ..worn
         }
     }
@@ -310,7 +311,18 @@ fn state(state: State) -> Headline {
     }
 }
 
-fn actions(ask: &Ask) -> Vec<Action> {
+/// What can be done. A pedal's key does nothing but take the pose.
+fn actions(ask: &Ask, pedal: Option<u8>) -> Vec<Action> {
+    let mut actions = all_actions(ask);
+    for action in &mut actions {
+        if pedal.is_some_and(|pedal| action.key.as_bytes() == [pedal]) {
+            action.key = "";
+        }
+    }
+    actions
+}
+
+fn all_actions(ask: &Ask) -> Vec<Action> {
     let undo = action("undo", "u", "take the last one back (u)");
     match ask.state {
         State::Trying => vec![
@@ -349,4 +361,29 @@ fn one(count: f32) -> u8 {
 
 fn whole(counts: &[f32]) -> Vec<u8> {
     counts.iter().copied().map(one).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pedal_s_key_skips_nothing_on_the_page_and_the_buttons_stay() {
+        let ask = Ask {
+            state: State::Asking(Stage::Stillness),
+            target: None,
+            number: 3,
+            of: 10,
+            start: None,
+        };
+        let keys = |pedal: Option<u8>| -> Vec<_> {
+            let of = |action: &Action| (action.name, action.key);
+            actions(&ask, pedal).iter().map(of).collect()
+        };
+        assert!(keys(None).contains(&("skip", "s")));
+        let with = keys(Some(b's'));
+        assert_eq!(with.len(), keys(None).len());
+        assert!(with.contains(&("skip", "")) && with.contains(&("take", ANY)));
+        assert!(with.contains(&("undo", "u")));
+    }
 }

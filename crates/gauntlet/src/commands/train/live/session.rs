@@ -17,7 +17,7 @@ use crate::tell::Tell;
 use host::failure::OrFail;
 use host::interrupt::Interrupt;
 use host::teaching::kept::Kept;
-use host::teaching::{Act, Aim, Learner, News, State, Taught, Teaching};
+use host::teaching::{Act, Aim, Counts, Learner, News, State, Taught, Teaching};
 use host::training::lessons::Lessons;
 
 const KEYS: &str = "hold still, or any key: take it   u: undo   r: redo   s: another pose   q: end";
@@ -36,10 +36,7 @@ pub(super) enum Shown {
 pub(super) struct Done {
     pub pairs: Vec<Taught>,
     pub lessons: Lessons,
-    /// Poses that were refused.
-    pub refused: usize,
-    /// Pairs that were taken back.
-    pub taken_back: usize,
+    pub counts: Counts,
     /// The longest time from a pose taken to the next one.
     pub slowest: Duration,
     /// How the gripper that was showing a pose was left, as its move says.
@@ -55,8 +52,6 @@ pub(super) struct Session<'a> {
     json: bool,
     map: Option<Arc<Model>>,
     said: Option<(String, bool)>,
-    refused: usize,
-    taken_back: usize,
     taken: Option<Instant>,
     slowest: Duration,
     /// The gripper that shows the poses, where one does.
@@ -81,8 +76,6 @@ impl<'a> Session<'a> {
             json,
             map: None,
             said: None,
-            refused: 0,
-            taken_back: 0,
             taken: None,
             slowest: Duration::ZERO,
             shower: None,
@@ -106,6 +99,7 @@ impl<'a> Session<'a> {
         let next = "the same with | cat behind it, which prints lines instead";
         let drawn = !self.json && out::is_drawn();
         let mut live = Live::start(!drawn).or_fail(terminal, next)?;
+        live.with_pedal();
         let suspend = interrupt.catch_suspend().or_fail(
             || "Ctrl-Z cannot be caught".to_owned(),
             "ending other programs: the system lacks descriptors",
@@ -231,12 +225,11 @@ impl<'a> Session<'a> {
                 self.keep()?;
                 self.say(format!("pose {number} taken"), true, tell, drawn);
             }
+            News::PassedOver => self.kept.keep_passed_over(self.teaching.passed_over())?,
             News::Refused(doubt) => {
-                self.refused += 1;
                 self.say(format!("not taken: {doubt}"), false, tell, drawn);
             }
             News::Changed(left) => {
-                self.taken_back += 1;
                 self.keep()?;
                 self.say(format!("{left} poses are kept"), true, tell, drawn);
             }
@@ -302,8 +295,7 @@ impl<'a> Session<'a> {
             left,
             pairs: self.teaching.pairs().to_vec(),
             lessons: self.learner.end()?,
-            refused: self.refused,
-            taken_back: self.taken_back,
+            counts: self.teaching.counts(),
             slowest: self.slowest,
         })
     }
