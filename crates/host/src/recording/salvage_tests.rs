@@ -233,6 +233,27 @@ fn chunks_taken_out_of_a_log_whole_are_missed_by_their_numbers_and_by_the_index(
     assert!(found.damage.iter().all(is_hole), "{found:?}");
 }
 
+#[test]
+fn a_few_bytes_of_something_else_before_a_chunk_cost_none_of_its_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = of_frames(&folder.path().join("run.mcap"));
+    let (all, _) = messages(&file);
+    let end = End::of(&file).unwrap();
+    let start = chunks(&file)[2].start - CHUNK_START;
+    for count in 1..=20 {
+        let odd = vec![0xFF; count];
+        let file = [&file[..start], &odd, &file[start..end.data]].concat();
+        let (some, found) = messages(&file);
+        assert!(
+            some == all,
+            "{count} bytes: {} of {}",
+            some.len(),
+            all.len()
+        );
+        assert_eq!(found.damage[0].bytes, start..start + count, "{found:?}");
+    }
+}
+
 /// Some programs number no messages: what is missing of theirs the index knows.
 #[test]
 fn a_chunk_of_another_program_that_reads_as_something_else_is_missed_by_the_index() {
