@@ -179,7 +179,7 @@ fn sessions() -> Result<(), String> {
     outcome?;
     println!(
         "50 seeded sessions, {time:.0} s on the virtual clock, {events} faults and acts: 0 of {commands} bytes to the gripper and 0 of {states} \
-         frames and states differ; replayed {:.0} times as fast as they were, {:.2} MB of trace a minute ({s:.0} s)",
+         frames and states differ; replayed {:.0} times as fast as they were, {:.2} MB of log a minute ({s:.0} s)",
         time / took,
         bytes as f64 / time * 60e-6
     );
