@@ -1,5 +1,7 @@
 //! A glove on a PC's port whose power is cut in mid-session, in real time.
 
+use crate::support::devices::behind_pty;
+
 use std::time::{Duration, Instant};
 
 use host::clock::Clock;
@@ -7,13 +9,12 @@ use host::glove::scan::{Config, Scanner};
 use host::interrupt::Interrupt;
 use host::lines::port::{BAUD, Port};
 use rig::glove::VirtualGlove;
-use rig::pty::PtyDevice;
 
 #[test]
 fn a_power_cycled_glove_comes_back_on_its_port_by_itself() {
     let still = |_: f64| [0.0; 25];
     let glove = VirtualGlove::new(Box::new(still), rig::glove::Config::at_baud(BAUD));
-    let device = PtyDevice::spawn(Box::new(glove.clone()), None).expect("a pseudo-terminal");
+    let (device, _) = behind_pty(glove.clone());
     let port = Port::open(device.path(), BAUD).expect("opens");
     let mut scanner = Scanner::new(port, Config::default()).with_set_baud();
     let clock = Clock::start();
@@ -44,7 +45,7 @@ fn a_glove_left_at_another_speed_is_found_there_and_only_a_slower_one_is_switche
     for baud in [9_600, 230_400, 460_800] {
         let still = |_: f64| [0.0; 25];
         let glove = VirtualGlove::new(Box::new(still), rig::glove::Config::at_baud(baud));
-        let device = PtyDevice::spawn(Box::new(glove.clone()), None).expect("a pseudo-terminal");
+        let (device, _) = behind_pty(glove.clone());
         let found = host::probe::open_glove(device.path(), &Interrupt::never().expect("a pipe"))
             .expect("found");
         assert_eq!(found.found, baud);

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 use rig::glove::VirtualGlove;
 use rig::gripper::{Config, VirtualGripper};
@@ -177,14 +177,36 @@ impl Bench {
 
     /// What the finished log has of a topic.
     pub fn logged(&self, topic: &str) -> Vec<serde_json::Value> {
+        self.logged_at_times(topic)
+            .map(|(_, value)| value)
+            .collect()
+    }
+
+    /// When a command that rests on no sample first left after `since`, by the stamps of the finished log.
+    pub fn held_after(&self, since: SystemTime) -> SystemTime {
+        self.logged_at_times("/gripper/command")
+            .find(|(at, command)| *at >= since && command["age_us"].is_null())
+            .expect("a hold in the log")
+            .0
+    }
+
+    fn logged_at_times(
+        &self,
+        topic: &str,
+    ) -> impl Iterator<Item = (SystemTime, serde_json::Value)> {
         let bytes = std::fs::read(&self.log).unwrap();
         assert!(mcap::Summary::read(&bytes).unwrap().is_some(), "no index");
-        mcap::MessageStream::new(&bytes)
+        let messages: Vec<_> = mcap::MessageStream::new(&bytes)
             .unwrap()
             .map(Result::unwrap)
             .filter(|message| message.channel.topic == topic)
-            .map(|message| serde_json::from_slice(&message.data).unwrap())
-            .collect()
+            .collect();
+        messages.into_iter().map(|message| {
+            (
+                SystemTime::UNIX_EPOCH + Duration::from_nanos(message.publish_time),
+                serde_json::from_slice(&message.data).unwrap(),
+            )
+        })
     }
 
     pub fn last_command_is_a_hold(&self) {

@@ -4,15 +4,18 @@
 use std::collections::VecDeque;
 use std::os::fd::OwnedFd;
 
+use host::realtime;
 use rig::glove::VirtualGlove;
 use rig::gripper::{Config, VirtualGripper};
 use rig::pty::{Handle, PtyDevice};
 use rig::{Device, Instant};
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 
-/// A device behind a pseudo-terminal, and the path to it.
+/// A device behind a pseudo-terminal, and the path to it. It answers in time whatever else the computer does, where that is
+/// allowed, as a real one would.
 pub fn behind_pty(device: impl Device + 'static) -> (Handle, String) {
-    let handle = PtyDevice::spawn(Box::new(device), None).unwrap();
+    let spawn = || PtyDevice::spawn(Box::new(device), None).unwrap();
+    let (handle, _) = realtime::starting(spawn).unwrap();
     let path = handle.path().to_str().unwrap().to_owned();
     (handle, path)
 }

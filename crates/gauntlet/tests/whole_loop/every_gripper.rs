@@ -127,7 +127,8 @@ fn a_glove_drives_every_two_finger_gripper_by_a_map_of_one_output() {
 fn a_three_finger_gripper_on_the_network_answers_every_fresh_frame() {
     let gripper = VirtualGripper::new(Config::default());
     gripper.preset_active();
-    let server = tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();
+    let serve = || tcp::serve(&gripper, "127.0.0.1:0", &rig::Clock::system()).unwrap();
+    let (server, _) = host::realtime::starting(serve).unwrap();
     let place = format!("tcp:{}", server.address());
     let model = support::model();
     let options = ["--model", model.to_str().unwrap()];

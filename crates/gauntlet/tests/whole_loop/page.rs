@@ -3,7 +3,7 @@
 use crate::support;
 
 use std::process::Stdio;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 use gauntlet::web::picture::Headline;
 use gauntlet::web::{Page, Picture, Wish};
@@ -275,6 +275,7 @@ fn one_page_holds_the_clutch_and_closing_it_opens_the_clutch_which_nobody_else_h
     let number = holder.number;
     holder.until_holding("later", |page| page.number > number + 10);
     assert!(holder.holds(), "{}", holder.picture["clutch"]);
+    let closed = SystemTime::now();
     drop(holder);
     // Opened, not run out: that is what `open` means and not `expired`.
     other.until("opened", |page| matches!(page.clutch(), "open" | "expired"));
@@ -293,6 +294,10 @@ fn one_page_holds_the_clutch_and_closing_it_opens_the_clutch_which_nobody_else_h
         Some("the program has ended")
     );
     ends_soon(&mut running.0);
+    // What docs/view.md promises of a page that is closed.
+    let held = bench.held_after(closed).duration_since(closed).unwrap();
+    println!("a closed page: the hold left {} ms later", held.as_millis());
+    assert!(held <= Duration::from_millis(500), "{held:?}");
     // The page's numbers are the log's, one after the other.
     let positions = bench.logged("/gripper/status");
     let mut logged = positions

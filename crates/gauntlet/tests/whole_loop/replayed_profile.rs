@@ -5,11 +5,11 @@ use std::path::Path;
 use host::calibration::Kept;
 use host::glove::hand::SEGMENT_NAMES;
 
-use crate::support::{Simulation, json, refusal, run};
+use crate::support::{Simulation, json, refusal, run, run_owned, teleop};
 
 /// A profile of the person of so many seed, as `simulate` writes it.
 fn profile(seed: &str) -> (Simulation, String) {
-    let simulation = Simulation::with(true, None, &["--seed", seed]);
+    let simulation = Simulation::with(true, Some("gripper"), &["--seed", seed]);
     let line = simulation
         .said
         .iter()
@@ -23,9 +23,24 @@ fn another_profile_of_the_glove_is_compared_and_one_of_another_glove_refused() {
     let folder = tempfile::tempdir().unwrap();
     let place = |name: &str| folder.path().join(name).display().to_string();
     let log = place("run.mcap");
-    let (_own, own) = profile("4");
-    let demo = ["demo", "--seed", "4", "--profile", &own, "--log", &log];
-    json(&run(&[&demo[..], &["--seconds", "8", "--json"]].concat()));
+    let (worn, own) = profile("4");
+    let options = [
+        "--profile",
+        &own,
+        "--calibrate-flat",
+        "--engage",
+        "--activate",
+        "--seconds",
+        "8",
+        "--json",
+        "--log",
+        &log,
+    ];
+    json(&run_owned(&teleop(
+        &worn.glove(),
+        &worn.gripper(),
+        &options,
+    )));
     let replayed = |profile: &str| run(&["replay", &log, "--profile", profile, "--json"]);
 
     let same = json(&replayed(&own));

@@ -117,7 +117,7 @@ pub fn train(request: &Request<'_>, interrupt: &Interrupt) -> Result<Outcome> {
     let measured = task.measure(&mut model, interrupt)?;
     let mut references = Matrix::default();
     for target in learned.trained.pairs.targets.iter_rows() {
-        references.push(&model.x.invert(target));
+        references.push(&task.units.x.invert(target));
     }
     Ok(Outcome {
         quality: Quality::from_measured(&measured, request.space),

@@ -184,7 +184,7 @@ impl Lessons {
                 f: networks.f,
                 g: networks.g,
                 q: units.q.clone(),
-                x: units.x.clone(),
+                x: self.task.reach(),
                 metadata: Default::default(),
             }),
         })

@@ -280,13 +280,18 @@ impl Task {
         )
     }
 
+    /// The target's units of a finished map.
+    pub(super) fn reach(&self) -> Normalisation {
+        self.hand.map_or_else(|| self.units.x.clone(), Space::reach)
+    }
+
     /// The model of a trained map with everything that is known about it but its measures.
     pub fn model(&self, course: &Course, learned: &Learned) -> Model {
         let mut model = Model {
             f: learned.trained.networks.f.clone(),
             g: learned.trained.networks.g.clone(),
             q: self.units.q.clone(),
-            x: self.units.x.clone(),
+            x: self.reach(),
             metadata: Default::default(),
         };
         self.describe_in(&mut model, &course.settings(self), learned);

@@ -17,6 +17,8 @@ pub enum Space {
 
 /// Counts from open to closed.
 const STROKE: f32 = gripper::space::MAX;
+/// How much farther from the middle a finished map goes than its training did: 6 counts beyond either end.
+const REACH: f32 = 1.05;
 /// Scissor counts of the hand that is neither spread nor gathered.
 pub(super) const NEUTRAL_SCISSOR: f32 = 130.0;
 
@@ -117,6 +119,14 @@ impl Space {
         Normalisation::gripper(self.axes())
     }
 
+    /// Network units of a finished map as counts: a little beyond both ends, where the gripper stays at its end. A hand is never
+    /// exactly as it was shown, and a fist that is not quite one must close the gripper all the same
+    /// (docs/decisions/map-reaches-beyond-the-ends.md).
+    #[must_use]
+    pub fn reach(self) -> Normalisation {
+        self.units().stretched(REACH)
+    }
+
     /// The factors of the cost: the paper's for hands, and five times the weight of the pairs for one axis, whose two ends would else be
     /// some counts short.
     #[must_use]
@@ -174,6 +184,20 @@ mod tests {
         ] {
             assert!(!space.contains(outside));
             assert!(space.contains(&space.nearest(outside)));
+        }
+    }
+
+    #[test]
+    fn a_finished_map_goes_6_counts_beyond_both_ends_and_keeps_the_middle() {
+        for space in ALL {
+            for (counts, reached) in [(0.0, -6.375), (127.5, 127.5), (255.0, 261.375)] {
+                let trained = space.units().apply(&vec![counts; space.axes()]);
+                let found = space.reach().invert(&trained);
+                assert!(
+                    found.iter().all(|found| (found - reached).abs() < 1e-3),
+                    "{counts}: {found:?}"
+                );
+            }
         }
     }
 

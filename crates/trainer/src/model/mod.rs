@@ -57,6 +57,15 @@ impl Normalisation {
         normalisation
     }
 
+    /// With network units that reach `factor` times as far from the middle.
+    #[must_use]
+    pub fn stretched(&self, factor: f32) -> Self {
+        Self {
+            offset: self.offset.clone(),
+            scale: self.scale.iter().map(|scale| factor * scale).collect(),
+        }
+    }
+
     /// To network units. Values beyond the columns are passed over.
     #[must_use]
     pub fn apply(&self, values: &[f32]) -> Vec<f32> {
