@@ -3,6 +3,9 @@
 //! Two layouts, and no horizontal sums in the inner loops: *point lanes* (16 samples side by side, weights broadcast) where results
 //! belong to samples, *hidden lanes* (16 hidden units side by side, samples broadcast) where they belong to weights. Both add in
 //! the same order, so both see the same activations. Hidden units are padded to a multiple of 16 with zeros, which stay zero.
+//!
+//! Square roots are `f32::sqrt` here, not libm's: that is always the instruction of SSE, and each between AVX's own costs an Intel
+//! processor some hundred cycles (docs/measurements/trainer.md).
 
 pub(crate) mod affine;
 pub(crate) mod boxes;

@@ -92,7 +92,7 @@ impl Lanes for Plain {
     }
     #[inline(always)]
     unsafe fn sqrt(self) -> Self {
-        Self(self.0.map(libm::sqrtf))
+        Self(self.0.map(f32::sqrt))
     }
     #[inline(always)]
     unsafe fn max(self, other: Self) -> Self {

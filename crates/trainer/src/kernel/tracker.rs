@@ -218,14 +218,14 @@ unsafe fn search_boxes<V: Lanes>(
         }
     }
     tracker.nearest[n] = best.index;
-    let second = libm::sqrtf(best.other.min(unseen)) * (1.0 - SHARE);
+    let second = best.other.min(unseen).sqrt() * (1.0 - SHARE);
     tracker.second[n] = second + (field.total_way + field.query_ways[n]);
 }
 
 /// Boxes within this squared distance are looked into: the best so far, and what would come near it soon.
 #[inline(always)]
 fn reach(best: &Best, field: &Field<'_>) -> f32 {
-    let far = libm::sqrtf(best.square) * (1.0 + SHARE) + MORE + AHEAD * field.longest;
+    let far = best.square.sqrt() * (1.0 + SHARE) + MORE + AHEAD * field.longest;
     far * far
 }
 
@@ -263,7 +263,7 @@ unsafe fn search<V: Lanes>(
             let bound = V::load(bounds.as_ptr().add(first));
             let way = V::load(field.block_ways.as_ptr().add(first)).add(V::splat(query_way));
             let bound = bound.sub(way);
-            let far = libm::sqrtf(best.square) * (1.0 + SHARE) + MORE + AHEAD * field.longest;
+            let far = best.square.sqrt() * (1.0 + SHARE) + MORE + AHEAD * field.longest;
             let beyond = V::bits(bound.gt(V::splat(far)));
             let used = u16::MAX >> (LANES - (blocks - first).min(LANES));
             let here = if home / LANES == first / LANES {
@@ -288,7 +288,7 @@ unsafe fn search<V: Lanes>(
             }
         }
         tracker.nearest[n] = best.index;
-        let other = libm::sqrtf(best.other) * (1.0 - SHARE);
+        let other = best.other.sqrt() * (1.0 - SHARE);
         tracker.second[n] = other.min(unseen) + (field.total_way + query_way);
     }
 }
@@ -305,7 +305,7 @@ unsafe fn look<V: Lanes>(
 ) {
     // SAFETY: the caller checked the lengths.
     let least = unsafe { look_at::<V>(best, query, dims, field, block) };
-    let bound = libm::sqrtf(least) * (1.0 - SHARE);
+    let bound = least.sqrt() * (1.0 - SHARE);
     bounds[block] = bound + (field.block_ways[block] + query_way);
 }
 
