@@ -23,7 +23,7 @@ use host::lines::port::BAUD;
 use host::report::Nobody;
 use host::scanning::{Flat, Hand, Scanned};
 use host::teaching::kept::{Kept, load_pairs, matrices};
-use host::teaching::{Act, Aim, Earlier, Free, News, State, Taught, Teaching};
+use host::teaching::{Act, Aim, Earlier, Free, LAST_STAGE, News, State, Taught, Teaching};
 use host::training::Course;
 use host::training::judgement::Judgement;
 use host::training::lessons::{Finished, Lessons};
@@ -181,7 +181,7 @@ pub struct Lived {
     pub seed: u64,
     /// In this pair (from 1) the person shows nonsense.
     pub nonsense: Option<usize>,
-    /// Starts of the last stage; none said: as many as usual.
+    /// Starts of the last stage; none said: as many as end in time.
     pub starts: Option<usize>,
 }
 
@@ -224,6 +224,8 @@ impl Lived {
         let course = Course {
             threads: Some(1),
             starts: self.starts,
+            // Two processors share them otherwise.
+            within: self.starts.is_none().then_some(2 * LAST_STAGE),
             ..Course::hae(Schedule::Fast, None, self.seed)
         };
         let lessons = Lessons::of_gripper(&motion, self.space, course, &Nobody)?;

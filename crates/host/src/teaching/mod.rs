@@ -7,6 +7,8 @@
 //! The pairs and the recorded motion are the whole state: the trainings that led to a pose follow from them bit for bit, and are made
 //! again in less than a second where a session goes on.
 
+use std::time::Duration;
+
 pub mod aim;
 pub mod doubt;
 mod free;
@@ -21,3 +23,6 @@ pub use free::{Free, FreeAsk};
 pub use hold::{HOLD, Hold, READ, Stage};
 pub use learner::{Learned, Learner, Wanted};
 pub use rounds::{Act, Ask, Counts, Earlier, News, State, Teaching};
+
+/// How long a person who has shown the poses is likely to wait for the map: of several starts as many as end in this time.
+pub const LAST_STAGE: Duration = Duration::from_secs(20);

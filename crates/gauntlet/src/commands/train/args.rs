@@ -109,7 +109,7 @@ pub struct Train {
     pub hidden: u32,
     /// Starts that differ in their first weights (1 to 64): those that cost most on the training samples end early, and of the others
     /// the one most like them is taken, of two the cheaper; 1 is the paper's way [default: 32, targets of more than 2 dimensions 16,
-    /// hands 6; 1 with --schedule paper or another --cost].
+    /// hands 6, with --live as many of them as end in 20 s; 1 with --schedule paper or another --cost].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub starts: Option<u8>,
     /// Weights that start normally distributed with this deviation (0.1, say), or Glorot's uniform ones

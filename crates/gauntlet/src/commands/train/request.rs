@@ -9,6 +9,7 @@ use super::args::Train;
 use crate::progress::Person;
 use crate::tell::Tell;
 use host::failure::Failure;
+use host::teaching::LAST_STAGE;
 use host::training::motion::Motion;
 use host::training::{Course, Task, domains, hand};
 
@@ -85,7 +86,7 @@ pub(super) fn course(options: &Train) -> Course {
         hidden: options.hidden as usize,
         initialisation: options.normal,
         starts: options.starts.map(usize::from),
-        within: None,
+        within: (options.live && options.starts.is_none()).then_some(LAST_STAGE),
         seed: options.seed,
         threads: options.threads.map(usize::from),
         checkpoint: options
