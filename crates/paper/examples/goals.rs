@@ -1,7 +1,7 @@
 //! Whether maps depend on luck: every data set trained as `train` does it, over many seeds, held to what each must reach.
 //!
-//! `cargo run --release -p paper --example goals -- FOLDER [SEEDS [RECORDING.csv]]`, 30 seeds if nothing is said (of 30 or more, SP1
-//! has 100: its folds are rare). Each map is a line of `FOLDER/DATA.csv`, written as soon as it is there: the same command goes on
+//! `cargo run --release -p paper --example goals -- FOLDER [SEEDS [DATA…]]`, 30 seeds if nothing is said (of 30 or more, SP1 has
+//! 100: its folds are rare), of `sp1` to `sp4`, `same-hand`, `hand`, or a recording's CSV; all but that if nothing is said. Each map is a line of `FOLDER/DATA.csv`, written as soon as it is there: the same command goes on
 //! after a stop. At the end a table in Markdown on standard output. Seeds are trained side by side, one thread each.
 
 #[path = "common/domain.rs"]
@@ -192,11 +192,14 @@ fn report(name: &str, maps: &BTreeMap<u64, Map>) {
 
 fn main() -> Result<()> {
     let words: Vec<String> = std::env::args().skip(1).collect();
-    let folder = Path::new(words.first().ok_or("FOLDER [SEEDS [RECORDING.csv]]")?);
+    let folder = Path::new(words.first().ok_or("FOLDER [SEEDS [DATA…]]")?);
     let usual: u64 = words.get(1).map_or(Ok(30), |word| word.parse())?;
     std::fs::create_dir_all(folder)?;
-    let mut sets = vec!["sp2", "sp3", "same-hand", "sp4", "sp1", "hand"];
-    sets.extend(words.get(2).map(String::as_str));
+    let asked: Vec<&str> = words.iter().skip(2).map(String::as_str).collect();
+    let sets = match &asked[..] {
+        [] => vec!["sp2", "sp3", "same-hand", "sp4", "sp1", "hand"],
+        asked => asked.to_vec(),
+    };
     println!("| data | seeds | of all seeds | goal | found | holds |\n|---|---|---|---|---|---|");
     for data in sets {
         let name = if data.contains('.') {
