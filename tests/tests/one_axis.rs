@@ -1,16 +1,25 @@
 //! The same loop with a gripper of one axis: the map's number of outputs follows the gripper's axes.
 
 use bridge::{App, Board, Config, Epoch, Instant, Platform, State};
+use glove::hand::LIMITS;
 use glove::scan::Scanner;
 use gripper::Gripper;
 use gripper::driver::TwoFinger;
 use gripper::registers::two_finger::Model;
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
+use host::interrupt::Interrupt;
+use host::training::motion::Motion;
+use host::training::{Request, train};
 use loop_tests::bench::{Devices, empty_store};
 use loop_tests::nor_slot::NorSlot;
 use rig::glove::VirtualGlove;
 use rig::gripper::{Family, VirtualGripper};
 use rig::{Clock, MemoryWire};
+use trainer::algorithm::Schedule;
+use trainer::hand::Space;
+use trainer::hand::motion::Generator;
+
+const SEED: u64 = 1;
 
 /// The index finger's proximal flexion.
 const JOINT: usize = 5;
@@ -67,6 +76,27 @@ fn image(outputs: usize) -> Vec<u8> {
     bytes
 }
 
+/// A trained map of one axis, as the tool makes it of generated motion.
+fn trained() -> Vec<u8> {
+    let outcome = train(
+        &Request {
+            space: Space::OneAxis,
+            motion: &Motion::Generated { seed: SEED },
+            schedule: Schedule::Fast,
+            epochs: None,
+            pairs: 8,
+            start_pairs: true,
+            seed: SEED,
+            within: None,
+            reporter: &host::report::Nobody,
+        },
+        &Interrupt::never().expect("an interrupt"),
+    )
+    .expect("a map");
+    println!("seed {SEED}: {:?}", outcome.quality);
+    host::training::model::image(&outcome.model).expect("an image")
+}
+
 fn hand(closed: f32) -> [f32; 25] {
     core::array::from_fn(|joint| if joint == JOINT { closed } else { 0.0 })
 }
@@ -82,8 +112,9 @@ struct Session {
 }
 
 impl Session {
-    /// Nothing has moved yet; the sensors sit straight.
+    /// Nothing has moved yet; the sensors sit straight, and the map is that of `image`.
     fn start(
+        image: &[u8],
         model: Model,
         family: Family,
         pose: impl Fn(f64) -> [f32; 25] + Send + 'static,
@@ -97,9 +128,8 @@ impl Session {
         } = Devices::with(pose, family);
         gripper.preset_active();
         let mut store = empty_store(1);
-        let image = image(1);
         store.begin(image.len()).expect("room");
-        store.chunk(0, &image).expect("bytes");
+        store.chunk(0, image).expect("bytes");
         store.commit().expect("an image of one output");
         let mut app: App<_, 1> = App::new(
             Machine(clock.clone()),
@@ -146,7 +176,7 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
         (Model::TwoFinger140, Family::TwoFinger140),
         (Model::HandE, Family::HandE),
     ] {
-        let mut session = Session::start(model, family, |_| hand(0.1));
+        let mut session = Session::start(&image(1), model, family, |_| hand(0.1));
         session.run_until(5);
         let open = session.followed();
         assert!((open - 25.5).abs() < 3.0, "{family:?} {open}");
@@ -163,11 +193,16 @@ fn a_glove_closes_every_two_finger_gripper_by_a_map_of_one_output() {
     }
 }
 
-/// The gripper's cycles a second of a whole session, and where the hand's two ends put it: open from the start, a fist after
-/// `half` seconds.
-fn open_and_fist(model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]) {
-    let pose = move |time_s: f64| hand((time_s - half as f64).clamp(0.0, 1.0) as f32);
-    let mut session = Session::start(model, family, pose);
+/// The gripper's cycles a second of a whole session by the map of `image`, and where the hand's two ends put it: open from the
+/// start, a fist after `half` seconds.
+fn open_and_fist(image: &[u8], model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]) {
+    let generator = Generator::new(&LIMITS, SEED);
+    let (open, fist) = (generator.flat_hand(), generator.fist());
+    let pose = move |time_s: f64| -> [f32; 25] {
+        let share = (time_s - half as f64).clamp(0.0, 1.0) as f32;
+        core::array::from_fn(|joint| open[joint] + share * (fist[joint] - open[joint]))
+    };
+    let mut session = Session::start(image, model, family, pose);
     let (mut ends, mut cycles) = ([f32::NAN; 2], Vec::new());
     for second in 1..=2 * half {
         let before = session.app.telemetry().status_sequence;
@@ -182,12 +217,13 @@ fn open_and_fist(model: Model, family: Family, half: u64) -> (Vec<u32>, [f32; 2]
 
 #[test]
 fn an_open_hand_opens_a_two_finger_gripper_a_fist_closes_it_and_100_cycles_a_second_are_held() {
+    let image = trained();
     for (model, family, half) in [
         (Model::TwoFinger85, Family::TwoFinger85, 55),
         (Model::TwoFinger140, Family::TwoFinger140, 6),
         (Model::HandE, Family::HandE, 6),
     ] {
-        let (cycles, [open, closed]) = open_and_fist(model, family, half);
+        let (cycles, [open, closed]) = open_and_fist(&image, model, family, half);
         println!("{family:?}: {open:.1} open, {closed:.1} closed, cycles {cycles:?}");
         assert!((open - OPEN).abs() <= 5.0, "{family:?}: {open}");
         assert!((closed - CLOSED).abs() <= 5.0, "{family:?}: {closed}");

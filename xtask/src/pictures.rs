@@ -13,6 +13,14 @@ pub fn run() -> Result<(), Failure> {
         "pictures of the page",
         step::whole_loop().args(only).env("PAGE_PICTURES", &folder),
     )?;
+    // The states of a real training, as the program shows them.
+    let training = ["--nocapture", "taught::poses_are_shown"];
+    step::run(
+        "pictures of a training",
+        step::whole_loop()
+            .args(training)
+            .env("PAGE_PICTURES", &folder),
+    )?;
     println!("docs/view.webp, and to look at: {}", folder.display());
     Ok(())
 }

@@ -9,7 +9,7 @@ use common::bench::{Bench, MS, S};
 use common::wearer::Wearer;
 use glove::calibration::Misfit;
 use glove::hand::SEGMENT_COUNT;
-use rig::person::{Attitude, Person, Task};
+use rig::person::{Attitude, Person, Task, Traits};
 
 /// The angles of the little finger's base and of the hinge after it.
 const BESIDE_13: u32 = 0b1111 << 20;
@@ -28,19 +28,24 @@ const FLAT_AGAIN: u64 = 30 * S;
 /// Calibrated by the profile and a flat pose, activated, following the hand.
 fn following(wearer: &Wearer) -> (Bench, Person) {
     let (mut bench, person) = wearing(wearer);
+    start(&mut bench, wearer);
+    (bench, person)
+}
+
+/// The hand lies flat: by its profile it is calibrated, and followed from then on.
+fn start(bench: &mut Bench, wearer: &Wearer) {
     bench
         .app
         .set_profile(Some(&wearer.profile()))
         .expect("open");
     bench.until("frames", |b| b.app.telemetry().frame_sequence > 20);
     bench.app.activate();
-    pose(&mut bench).expect("flat");
+    pose(bench).expect("flat");
     bench.until("activated", |b| {
         let status = b.app.telemetry().status;
         status.is_some_and(|status| status.activation == gripper::Activation::Ready)
     });
     bench.follow();
-    (bench, person)
 }
 
 fn is_not_calibrated(state: State) -> bool {
@@ -208,6 +213,81 @@ fn after_a_power_cut_of_the_glove_one_flat_pose_goes_on() {
 }
 
 #[test]
+fn after_a_power_cut_in_any_state_one_flat_pose_goes_on() {
+    type Enter = fn(&mut Bench);
+    let states: [(&str, Enter); 5] = [
+        ("idle", |b: &mut Bench| {
+            b.release();
+            b.run(500 * MS);
+            assert_eq!(b.state(), State::Idle);
+        }),
+        ("a flat pose under way", |b: &mut Bench| {
+            b.release();
+            until_flat_again(b);
+            b.app.calibrate_flat_hand();
+            b.run(500 * MS);
+            assert_eq!(b.app.telemetry().calibration.newest, Try::Waiting);
+        }),
+        ("holding", |b: &mut Bench| {
+            lose_two(b, true);
+            b.until("held", |b| matches!(b.state(), State::Holding(_)));
+        }),
+        ("safe action", |b: &mut Bench| {
+            lose_two(b, true);
+            b.run(2 * S);
+            assert!(matches!(b.state(), State::SafeAction(_)));
+        }),
+        ("blending", |b: &mut Bench| {
+            b.release();
+            b.run(500 * MS);
+            b.clutch = true;
+            b.until("blending", |b| b.state() == State::Blending);
+            b.run(200 * MS);
+            assert_eq!(b.state(), State::Blending);
+        }),
+    ];
+    for (name, enter) in states {
+        let (mut bench, _) = following(&Wearer::new(1));
+        bench.run(S);
+        enter(&mut bench);
+        bench.glove.power(false, bench.clock.now());
+        lose_two(&bench, false);
+        bench.run(S);
+        bench.glove.power(true, bench.clock.now());
+        bench.run(8 * S);
+        bench.until("whole frames", |b| b.app.telemetry().missing == 0);
+        let telemetry = bench.app.telemetry();
+        assert!(telemetry.glove_answers, "{name}");
+        assert_eq!(telemetry.lacks(), Some(Lack::FlatPose), "{name}");
+        assert_ne!(telemetry.calibration.newest, Try::Waiting, "{name}");
+        if !bench.clutch {
+            // Who closes it now is told.
+            bench.clutch = true;
+            bench.run(S);
+        }
+        let state = bench.state();
+        assert!(is_not_calibrated(state), "{name}: {state:?}");
+        bench.release();
+        until_flat_again(&mut bench);
+        let calibration = bench.app.telemetry().calibration;
+        assert!(!calibration.is_calibrated, "{name}: not by itself");
+        assert_eq!(pose(&mut bench), Ok(()), "{name}");
+        bench.follow();
+    }
+}
+
+/// The hand lies flat again, for some seconds already; at once, where that is so.
+fn until_flat_again(bench: &mut Bench) {
+    bench.run((FLAT_AGAIN + 4 * S).saturating_sub(bench.now()));
+}
+
+/// Two sensors go off the bus, which holds everything, or are put back.
+fn lose_two(bench: &Bench, lost: bool) {
+    bench.glove.unplug(6, lost);
+    bench.glove.unplug(9, lost);
+}
+
+#[test]
 fn another_glove_put_on_the_same_port_is_not_calibrated_by_the_profile_of_the_one_before() {
     // As after power-on, and one that runs already: its cable was put into the port.
     for is_power in [true, false] {
@@ -348,8 +428,15 @@ fn when_the_hands_sensor_slipped_everything_is_held_until_somebody_calibrates() 
 
 /// A sensor slips in small pieces, so that it does not jump, about the vertical of a flat hand.
 fn slip(bench: &mut Bench, sensor: usize, degrees: f64) {
+    slip_together(bench, &[sensor], degrees);
+}
+
+/// The same of several, each by as much.
+fn slip_together(bench: &mut Bench, sensors: &[usize], degrees: f64) {
     for _ in 0..10 {
-        bench.glove.slip(sensor, [0.0, 1.0, 0.0], degrees / 10.0);
+        for &sensor in sensors {
+            bench.glove.slip(sensor, [0.0, 1.0, 0.0], degrees / 10.0);
+        }
         bench.run(100 * MS);
     }
 }
@@ -408,6 +495,118 @@ fn a_flat_pose_is_found_while_the_gripper_follows_and_enters_over_a_second() {
     let found = |event: &bridge::Event| matches!(event.kind, Kind::FlatPoseFound { .. });
     assert!(bench.events.iter().any(found));
     assert_eq!(bench.state(), State::Following);
+}
+
+/// A hand that lies exactly flat in quiet sensors without drift: a flat pose corrects what the test put there, and little else.
+fn exact() -> Wearer {
+    let mut wearer = Wearer::new(1);
+    wearer.traits = Traits {
+        wobble: 0.0,
+        tremor: 0.0,
+        ..Traits::exact(1)
+    };
+    (wearer.honest.drift, wearer.honest.walk) = (0.0, 0.0);
+    // Not less: sensors that repeat themselves bit by bit are frozen.
+    wearer.honest.noise = [0.05, 0.05];
+    wearer
+}
+
+/// The next frame's time, µs, and the index finger's abduction in it, degrees.
+fn next_abduction(bench: &mut Bench) -> (u64, f32) {
+    let seen = bench.app.telemetry().frame_sequence;
+    bench.until("a frame", |b| b.app.telemetry().frame_sequence != seen);
+    let telemetry = bench.app.telemetry();
+    (telemetry.now.as_ticks(), telemetry.angles[6].to_degrees())
+}
+
+fn mean(frames: &[(u64, f32)]) -> f32 {
+    frames.iter().map(|(_, angle)| angle).sum::<f32>() / frames.len() as f32
+}
+
+#[test]
+fn a_heading_that_is_far_off_is_corrected_by_a_found_flat_pose_over_a_second_at_least() {
+    let wearer = exact();
+    let (mut bench, _) = wearing(&wearer);
+    bench.app.set_finds_flat(false);
+    start(&mut bench, &wearer);
+    until_flat_again(&mut bench);
+    // The whole index finger about the vertical: the heading across its base is off, and no other. Beyond 11° it would count as slipped.
+    slip_together(&mut bench, &[4, 5, 6], 9.0);
+    bench.run(S);
+    let frames: Vec<_> = (0..20).map(|_| next_abduction(&mut bench)).collect();
+    let before = mean(&frames);
+    let poses = bench.app.telemetry().poses;
+    bench.app.set_finds_flat(true);
+    bench.until("a pose", |b| b.app.telemetry().poses != poses);
+    let taken = bench.app.telemetry().now.as_ticks();
+    let report = bench.app.telemetry().pose.expect("taken");
+    let off = report.off[4].to_degrees().abs();
+    assert!(report.found && (7.0..11.0).contains(&off), "{off}°");
+    let mut frames: Vec<(u64, f32)> = Vec::new();
+    while frames.last().is_none_or(|(at, _)| *at < taken + 6 * S) {
+        frames.push(next_abduction(&mut bench));
+    }
+    let corrected = mean(&frames[frames.len() - 20..]) - before;
+    assert!(corrected.abs() > 3.0, "{corrected}°");
+    let most = |(_, angle): &&(u64, f32)| (angle - before) / corrected >= 0.9;
+    let entered = frames.iter().find(most).map(|(at, _)| at - taken);
+    println!("{corrected}° of {off}°, nine tenths of it after {entered:?} µs");
+    assert!(
+        entered.is_some_and(|us| (S..5 * S).contains(&us)),
+        "{entered:?}"
+    );
+    assert_eq!(bench.app.telemetry().distrusted, 0);
+    assert_eq!(bench.state(), State::Following);
+}
+
+#[test]
+fn a_joint_whose_heading_nothing_showed_for_minutes_is_named_and_held_until_a_flat_pose() {
+    const THUMB_BASE: u32 = 0b111;
+    let wearer = Wearer::new(1);
+    // Rolled so that the axis of the thumb's base is upright: only a flat pose would show its heading. The hinges, which a flat pose
+    // makes surer, stay sure for longer.
+    let rolled = Attitude::Steady {
+        roll: -40.0,
+        pitch: 0.0,
+    };
+    let (mut bench, _) = wearer.bench(&[(Task::Flat, 0.0), (Task::Use(rolled), 12.0)]);
+    bench.app.set_finds_flat(false);
+    start(&mut bench, &wearer);
+    let begun = bench.now();
+    while !bench.told(Kind::Unsure { segment: 1 }) {
+        let sigma = bench.app.telemetry().sigma.map(f32::to_degrees);
+        assert!(bench.now() < begun + 600 * S, "sure: {sigma:?}°");
+        bench.run(100 * MS);
+    }
+    println!("unsure after {} s", (bench.now() - begun) / S);
+    let telemetry = bench.app.telemetry();
+    // What docs/safety.md states.
+    let sigma = telemetry.sigma[1].to_degrees();
+    assert!((5.99..6.5).contains(&sigma), "{sigma}°");
+    assert_eq!(telemetry.degraded, 1 << 1, "and no other");
+    let named = |event: &&bridge::Event| matches!(event.kind, Kind::Unsure { .. });
+    assert_eq!(bench.events.iter().filter(named).count(), 1);
+    assert_eq!(bench.state(), State::Following);
+    let thumb_base = |b: &Bench| b.app.telemetry().angles[..3].to_vec();
+    let (held, others) = (
+        thumb_base(&bench),
+        bench.app.telemetry().angles[3..].to_vec(),
+    );
+    for _ in 0..10 {
+        bench.run(100 * MS);
+        assert_eq!(bench.app.telemetry().held_joints & THUMB_BASE, THUMB_BASE);
+        assert_eq!(thumb_base(&bench), held, "repeats its last angles");
+    }
+    assert_ne!(bench.app.telemetry().angles[3..].to_vec(), others);
+    bench.release();
+    bench.glove.ask(Task::Flat);
+    bench.run(4 * S);
+    pose(&mut bench).expect("flat");
+    bench.run(S);
+    assert!(bench.told(Kind::Sure { segment: 1 }));
+    assert_eq!(bench.app.telemetry().degraded, 0);
+    assert_eq!(bench.app.telemetry().held_joints & THUMB_BASE, 0);
+    bench.follow();
 }
 
 #[test]

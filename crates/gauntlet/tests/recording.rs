@@ -385,6 +385,17 @@ fn a_live_training_that_is_killed_goes_on_with_its_pairs_and_its_map_can_be_repo
         page.contains(reported["influence"][0].as_str().unwrap()),
         "the sentences are on it"
     );
+    for section in [
+        "Which finger moves what",
+        "each joint alone",
+        "Hand and gripper over six seconds",
+        "How far the gripper is reached",
+        "Folds and twists",
+        "Both domains in their principal axes",
+        "How it was trained",
+    ] {
+        assert!(page.contains(section), "no {section}");
+    }
     // Nothing is fetched: no address but the names of SVG itself.
     let addresses = page
         .split("http")

@@ -38,7 +38,7 @@ fn cut(bench: &mut Bench, off: u64) -> u64 {
 fn frames_are_back_by_themselves_within_seconds_of_a_power_cut_at_any_moment() {
     let seed = 0x5EED_0003_u64;
     println!("seed {seed:#x}");
-    let (mut random, mut longest) = (seed, 0);
+    let (mut random, mut longest, mut met) = (seed, 0, Vec::new());
     for round in 0..300 {
         let mut bench = if round % 3 == 0 {
             bench()
@@ -51,6 +51,15 @@ fn frames_are_back_by_themselves_within_seconds_of_a_power_cut_at_any_moment() {
                 .wrapping_add(1);
             let (before, off) = ((random >> 40) % 1_500_000, (random >> 20) % 4_000_000);
             bench.until(bench.clock.now().as_ticks() + before);
+            if round % 4 == 3 {
+                // It comes back for a moment only: cut again while the scanner may still look for it.
+                let (away, back) = ((random >> 30) % 5_000_000, (random >> 10) % 1_500_000);
+                bench.glove.power(false, bench.clock.now());
+                bench.until(bench.clock.now().as_ticks() + away);
+                bench.glove.power(true, bench.clock.now());
+                bench.until(bench.clock.now().as_ticks() + back);
+            }
+            met.push(bench.scanner.state());
             longest = longest.max(cut(&mut bench, off));
         }
         let frames = bench.for_ms(200);
@@ -62,6 +71,16 @@ fn frames_are_back_by_themselves_within_seconds_of_a_power_cut_at_any_moment() {
         "whole frames {} ms after power at the latest",
         longest / 1_000
     );
+    for state in [
+        State::NoAnswer,
+        State::Resync,
+        State::Starting,
+        State::Scanning,
+    ] {
+        let cuts = met.iter().filter(|met| **met == state).count();
+        println!("{cuts} cuts in {state:?}");
+        assert!(cuts > 0, "never in {state:?}");
+    }
     assert!(longest < 6_000_000, "{longest}");
 }
 

@@ -20,7 +20,7 @@
 //! No command line, no terminal, no printing: who calls decides what a person sees. Nothing moves by connecting; the clutch
 //! is closed by [`session::Order::Engage`], an act of a person, and kept closed by a heartbeat every 100 ms.
 //!
-//! A gripper that follows a hand (`cargo run -p host --example follow GLOVE GRIPPER IMAGE`):
+//! A gripper that follows a hand (`cargo run -p host --example follow GLOVE GRIPPER IMAGE PROFILE`):
 //!
 //! ```no_run
 #![doc = include_str!("../examples/follow.rs")]

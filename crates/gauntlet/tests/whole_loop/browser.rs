@@ -3,19 +3,24 @@
 use crate::support;
 
 use std::collections::BTreeMap;
-use std::time::{Duration, Instant};
+use std::process::Stdio;
+use std::time::{Duration, Instant, SystemTime};
 
 use gauntlet::web::picture::{Action, Axis, Clutch, Gripper, Guide, Headline, Rates, Teach, Tone};
 use gauntlet::web::{self, Known, Page, Picture, Wish};
 use host::glove::hand::{JOINT_COUNT, Side};
 use host::glove::scan::Health;
 use host::gripper::kinematics::Model;
+use support::bench::{Bench, Running, ends_soon};
 use support::browser::Browser;
-use support::page::PATIENCE;
+use support::page::{OpenPage, PATIENCE, address};
 
 /// Whether the page says that the clutch may be closed.
 const OPEN: &str =
     "document.getElementById('clutch-words').textContent === 'clutch open: hold space'";
+/// Whether it says that this page holds it closed.
+const CLOSED: &str =
+    "document.getElementById('clutch-words').textContent === 'clutch closed: let go to open'";
 
 /// A hand bent by so much, and a gripper that is nearly there.
 pub fn picture(bent: f32) -> Picture {
@@ -107,6 +112,14 @@ fn text(browser: &mut Browser, id: &str) -> String {
     text.as_str().unwrap().to_owned()
 }
 
+/// The pixels of both bodies.
+fn drawn(browser: &mut Browser) -> [String; 2] {
+    ["hand", "gripper"].map(|id| {
+        let picture = browser.ask(&format!("document.getElementById('{id}').toDataURL()"));
+        picture.as_str().unwrap().to_owned()
+    })
+}
+
 #[test]
 fn a_browser_draws_what_it_is_told_fetches_nothing_else_and_says_what_a_person_does() {
     let Some(mut browser) = Browser::start() else {
@@ -160,12 +173,6 @@ fn a_browser_draws_what_it_is_told_fetches_nothing_else_and_says_what_a_person_d
         || picture(0.1),
     );
     // Both bodies move with it.
-    let drawn = |browser: &mut Browser| {
-        ["hand", "gripper"].map(|id| {
-            let picture = browser.ask(&format!("document.getElementById('{id}').toDataURL()"));
-            picture.as_str().unwrap().to_owned()
-        })
-    };
     let before = drawn(&mut browser);
     let now = |bent: f32| {
         let angles = serde_json::to_value(picture(bent)).unwrap();
@@ -193,9 +200,7 @@ fn a_browser_draws_what_it_is_told_fetches_nothing_else_and_says_what_a_person_d
         clutch: Some(clutch("closed", Some(1))),
         ..picture(0.1)
     };
-    let words =
-        "document.getElementById('clutch-words').textContent === 'clutch closed: let go to open'";
-    shown(&mut browser, &mut page, words, closed);
+    shown(&mut browser, &mut page, CLOSED, closed);
     browser.key(false, " ", "Space", 32);
     heard(&mut page, &Wish::Open, closed);
     shown(&mut browser, &mut page, OPEN, || picture(0.1));
@@ -231,6 +236,89 @@ fn a_browser_draws_what_it_is_told_fetches_nothing_else_and_says_what_a_person_d
     page.said().for_each(drop);
     browser.go("about:blank");
     heard(&mut page, &Wish::Gone, || picture(0.1));
+}
+
+#[test]
+fn a_person_at_a_browser_drives_the_gripper_sees_where_it_is_and_by_leaving_the_page_holds_it() {
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    let bench = Bench::new(&[]);
+    let mut words = bench.arguments();
+    words.push("--view");
+    let mut running = Running::start(
+        support::command(&words)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::inherit()),
+    );
+    let address = address(running.0.stdout.take().unwrap());
+    browser.screen((1280, 900), 1.0, "dark");
+    browser.go(&address);
+    let state =
+        |words: &str| format!("document.getElementById('state')?.textContent === '{words}'");
+    // Without a calibration it would say so instead.
+    browser.until(&state("idle"), || {});
+    browser.until(OPEN, || {});
+    browser
+        .ask("document.querySelectorAll('#sensors-panel details').forEach((d) => (d.open = true))");
+    browser.key(true, " ", "Space", 32);
+    browser.until(&state("following"), || {});
+    let before = drawn(&mut browser);
+    let begin = bench.gripper.positions();
+    bench.hand_moves();
+    // Farther than a flat hand seems to move by the noise of its sensors.
+    let bent = "parseFloat(document.querySelector('#angles').rows[1]?.cells[1].textContent) > 20";
+    let moved = |now: [f32; 4]| begin.iter().zip(now).any(|(a, b)| (a - b).abs() > 8.0);
+    let end = Instant::now() + PATIENCE;
+    while !moved(bench.gripper.positions()) || browser.ask(bent) != true {
+        assert!(Instant::now() < end, "{:?}", bench.gripper.positions());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let after = drawn(&mut browser);
+    assert!(before[0] != after[0], "the hand is drawn as it was");
+    assert!(before[1] != after[1], "the gripper is drawn as it was");
+    // Kept to be found in the log, once there is one.
+    let reached = "document.querySelector('#axes .number').firstChild.textContent.split(' → ')[1]";
+    let mut seen: Vec<f64> = Vec::new();
+    while seen.len() < 12 {
+        assert!(Instant::now() < end, "finger A stands: {seen:?}");
+        let number = browser.ask(reached);
+        let number: Option<f64> = number.as_str().and_then(|number| number.parse().ok());
+        if seen.last().copied() != number {
+            seen.extend(number);
+        }
+    }
+    assert!(
+        browser.complaints().is_empty(),
+        "{:?}",
+        browser.complaints()
+    );
+    let mut other = OpenPage::open(&address);
+    other.until("held in the browser", |page| page.clutch() == "closed");
+    browser.until(CLOSED, || {});
+    let closed = SystemTime::now();
+    browser.go("about:blank");
+    // Opened, not run out.
+    other.until("opened", |page| matches!(page.clutch(), "open" | "expired"));
+    assert_eq!(other.clutch(), "open");
+    // The end of a run is a hold, too: not the one that is looked for.
+    std::thread::sleep(Duration::from_millis(600));
+    support::interrupt(&running.0);
+    ends_soon(&mut running.0);
+    let held = bench.held_after(closed).duration_since(closed).unwrap();
+    println!("a page left: the hold left {} ms later", held.as_millis());
+    assert!(held <= Duration::from_millis(500), "{held:?}");
+    let positions = bench.logged("/gripper/status");
+    let mut logged = positions
+        .iter()
+        .filter_map(|status| status["gPOA"].as_f64());
+    for number in &seen {
+        let is_there = logged.any(|logged| logged == *number);
+        assert!(
+            is_there,
+            "{number} of {seen:?} is not in the log, or not then"
+        );
+    }
 }
 
 /// Every state that the page knows, at the width of a desk and of a phone, as pictures to look at: `PAGE_PICTURES` names the folder.

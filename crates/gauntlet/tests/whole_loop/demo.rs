@@ -2,7 +2,7 @@
 
 use crate::support;
 
-use support::{json, refusal, run};
+use support::{json, refusal, run, text};
 
 #[test]
 fn the_demo_trains_and_moves_the_gripper() {
@@ -48,6 +48,26 @@ fn the_demo_trains_and_moves_a_gripper_of_one_axis_with_ideal_sensors() {
     assert!(said["run"]["frames_answered"].as_u64() > Some(0), "{said}");
     assert_eq!(said["gripper"], "held");
     assert_eq!(said["person"], serde_json::Value::Null);
+}
+
+#[test]
+fn the_demo_trains_and_moves_the_three_finger_gripper_over_modbus_tcp() {
+    let words = ["demo", "--gripper-tcp", "--ideal", "--seconds", "8"];
+    let said = json(&run(&[&words[..], &["--json"]].concat()));
+    assert!(said["run"]["first_motion_s"].as_f64().is_some(), "{said}");
+    assert!(said["run"]["frames_answered"].as_u64() > Some(0), "{said}");
+    assert_eq!(said["gripper"], "held");
+}
+
+#[test]
+fn a_gripper_without_a_network_variant_and_a_chip_are_not_driven_over_modbus_tcp() {
+    let output = run(&["demo", "--gripper-tcp", "--gripper-model", "hande"]);
+    let error = refusal(&output, 2);
+    assert!(error.contains("Hand-E"), "{error}");
+    let output = run(&["demo", "--gripper-tcp", "--on-chip"]);
+    assert_eq!(output.status.code(), Some(2));
+    let error = text(&output.stderr);
+    assert!(error.contains("cannot be used with"), "{error}");
 }
 
 #[test]

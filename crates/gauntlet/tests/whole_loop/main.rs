@@ -25,3 +25,4 @@ mod replayed_profile;
 mod stalls;
 mod taught;
 mod view;
+mod viewed;

@@ -18,6 +18,7 @@ Examples:
   gauntlet demo --poses my_hand.csv --log session.mcap
   gauntlet demo --seconds 60 --json > result.json
   gauntlet demo --gripper-model 2f85
+  gauntlet demo --gripper-tcp
   gauntlet demo --on-chip
   gauntlet demo --calibrate
 
@@ -45,6 +46,9 @@ pub struct Demo {
     /// Which gripper follows the hand.
     #[arg(long, value_name = "MODEL", value_parser = model_parser(), default_value = "3f")]
     pub gripper_model: Model,
+    /// Drive the 3-Finger gripper over Modbus TCP, at a port of 127.0.0.1, instead of a serial line.
+    #[arg(long, conflicts_with = "on_chip")]
+    pub gripper_tcp: bool,
     /// How the glove is read; with --on-chip the chip's firmware says that.
     #[command(flatten)]
     pub reading: ReadingOptions,
@@ -82,6 +86,7 @@ impl Default for Demo {
             seed: 1,
             no_start_pairs: false,
             gripper_model: Model::ThreeFinger,
+            gripper_tcp: false,
             reading: ReadingOptions::default(),
             ideal: false,
             calibrate: false,

@@ -5,17 +5,40 @@ use std::time::Duration;
 use anyhow::Result;
 use host::glove::hand::Side;
 
+use super::args::Demo;
 use super::parts::{self, Stage, Started, Virtual};
 use super::person;
 use crate::progress::Person;
 use crate::run::{LogTo, Run};
 use host::clock::Clock;
+use host::failure::Failure;
+use host::lines::Model;
 use host::lines::port::BAUD;
+use host::next::Command;
 use host::probe;
 use host::recording::Drawn;
 use host::session::record::Feed;
 use host::session::{Devices, InProcess, Parts};
 use host::training::model;
+
+/// Whether there can be such a demo.
+///
+/// # Errors
+/// A failure of usage: a gripper that has no network variant.
+pub(super) fn check(options: &Demo) -> Result<()> {
+    let model = options.gripper_model;
+    if !options.gripper_tcp || model == Model::ThreeFinger {
+        return Ok(());
+    }
+    Err(Failure::usage(
+        format!(
+            "--gripper-tcp: only the 3-Finger gripper speaks Modbus TCP, not the {}",
+            model.name()
+        ),
+        Command::gauntlet("demo").option("--gripper-model", model.option()),
+    )
+    .into())
+}
 
 /// Starts the devices, calibrates, trains, and starts the bridge between them.
 ///
@@ -75,9 +98,13 @@ fn opened(
         ..
     } = stage;
     let model = options.gripper_model;
-    let (glove, gripper) = (devices.glove_port.path(), devices.gripper_port.path());
+    let (glove, gripper) = (devices.glove_port.path(), devices.gripper_place.as_path());
+    let speaks = match options.gripper_tcp {
+        true => "Modbus TCP".to_owned(),
+        false => format!("{BAUD} baud"),
+    };
     tell.say(format_args!(
-        "devices    virtual glove on {}, to be raised to {} baud, virtual gripper on {}, {BAUD} baud",
+        "devices    virtual glove on {}, to be raised to {} baud, virtual gripper on {}, {speaks}",
         glove.display(),
         options.reading.glove_baud,
         gripper.display()

@@ -40,8 +40,9 @@ pub(crate) fn run(options: &Demo, interrupt: &Interrupt) -> Result<()> {
     let tell = Tell::new(options.json);
     // Whose keys are not known is refused before anything is trained or moves.
     Settings::load()?;
-    if options.on_chip {
-        on_chip::check(options)?;
+    match options.on_chip {
+        true => on_chip::check(options)?,
+        false => here::check(options)?,
     }
     let motion = reading::ended_by(interrupt, "the recording", || {
         Motion::open_for_training(options.poses.as_deref(), options.seed, &Person)

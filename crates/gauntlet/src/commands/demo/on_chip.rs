@@ -54,7 +54,7 @@ pub(super) fn start(stage: Stage<'_>) -> Result<Started> {
     let mut emulator = Emulator::new(Setup {
         firmware,
         glove: Some(devices.glove_port.path().to_owned()),
-        gripper: Some(devices.gripper_port.path().to_owned()),
+        gripper: Some(devices.gripper_place.clone()),
         debugger: false,
     })?;
     let outcome = parts::trained(stage)?;
@@ -84,7 +84,7 @@ fn tell_parts(devices: &Virtual, emulator: &Emulator, tell: &Tell) {
     tell.say(format_args!(
         "devices    virtual glove on {}, virtual gripper on {}",
         devices.glove_port.path().display(),
-        devices.gripper_port.path().display()
+        devices.gripper_place.display()
     ));
     tell.say(format_args!(
         "bridge     Cortex-M4F (mps2-an386), host protocol on {}",

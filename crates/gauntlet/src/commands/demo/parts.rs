@@ -1,6 +1,7 @@
 //! What both homes of the demo's bridge share: the trained map, the virtual devices, what was started.
 
 use std::any::Any;
+use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 use anyhow::Result;
@@ -9,7 +10,7 @@ use host::trainer::algorithm::Schedule;
 use host::trainer::hand::Space;
 use rig::Device;
 use rig::glove::VirtualGlove;
-use rig::gripper::VirtualGripper;
+use rig::gripper::{VirtualGripper, tcp};
 use rig::pty::{Handle, PtyDevice};
 
 use super::args::Demo;
@@ -136,14 +137,16 @@ fn require_good(quality: &Quality) -> Result<()> {
     Err(Failure::new(fault, next).into())
 }
 
-/// The virtual devices, each behind a pseudo-terminal.
+/// The virtual devices, each behind a pseudo-terminal; the gripper behind a port of this computer's network where that is asked for.
 pub(super) struct Virtual {
     /// The glove.
     pub(super) glove: VirtualGlove,
     /// The way to it.
     pub(super) glove_port: Handle,
-    /// The way to the gripper, which is not activated.
-    pub(super) gripper_port: Handle,
+    /// Where the gripper is, which is not activated: a terminal, or `tcp:HOST:PORT`.
+    pub(super) gripper_place: PathBuf,
+    /// The gripper: gone when this is dropped.
+    _gripper: Box<dyn Any>,
 }
 
 impl Virtual {
@@ -157,11 +160,25 @@ impl Virtual {
             ),
             false => Wearer::new(options.seed).playing(played::source(stage.motion)),
         };
-        let gripper = rig::gripper::Config::of(simulate::family(options.gripper_model));
+        let family = simulate::family(options.gripper_model);
+        let gripper = VirtualGripper::new(rig::gripper::Config::of(family));
+        let glove_port = spawn("glove", Box::new(glove.clone()))?;
+        let (gripper_place, gripper): (PathBuf, Box<dyn Any>) = match options.gripper_tcp {
+            true => {
+                let server = listen(&gripper)?;
+                let place = format!("tcp:{}", server.address());
+                (place.into(), Box::new(server))
+            }
+            false => {
+                let port = spawn("gripper", Box::new(gripper))?;
+                (port.path().to_owned(), Box::new(port))
+            }
+        };
         Ok(Self {
-            glove_port: spawn("glove", Box::new(glove.clone()))?,
-            gripper_port: spawn("gripper", Box::new(VirtualGripper::new(gripper)))?,
             glove,
+            glove_port,
+            gripper_place,
+            _gripper: gripper,
         })
     }
 }
@@ -189,6 +206,17 @@ fn spawn(name: &str, device: Box<dyn Device>) -> Result<Handle> {
             advice("ending programs that hold many of them (")
                 .then(Command::program("ls").word("/dev/pts"))
                 .then(")"),
+        )
+}
+
+/// Lets `gripper` answer at any free port of this computer.
+fn listen(gripper: &VirtualGripper) -> Result<tcp::TcpHandle> {
+    let serve = || tcp::serve(gripper, "127.0.0.1:0", &rig::Clock::system());
+    realtime::starting(serve)
+        .and_then(|(server, _)| server)
+        .or_fail(
+            || "the virtual gripper gets no port of 127.0.0.1".to_owned(),
+            "ending programs that hold many of them, or the same without --gripper-tcp",
         )
 }
 

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use super::shown::Shown;
+use host::glove::hand::JOINT_NAMES;
 use host::training::judgement::Judgement;
 use host::training::judgement::influence::CAUSES;
 use host::words::{axis_words, gripper_words};
@@ -90,42 +91,56 @@ pub(super) fn measures(shown: &Shown<'_>) -> String {
     )
 }
 
-/// Which finger moves what, as a matrix and in words.
+/// Which finger moves what, as a matrix and in words, and which joint.
 pub(super) fn influence(shown: &Shown<'_>) -> String {
     let axes = axis_words(shown.space.axes());
-    let mut text = String::from("<table class=\"matrix\"><tr><th></th>");
-    for cause in CAUSES {
-        let _ = write!(text, "<th>{cause}</th>");
-    }
-    text.push_str("</tr>");
-    for (axis, row) in shown.judgement.influence.mean.iter().enumerate() {
-        let _ = write!(
-            text,
-            "<tr><th>{}</th>",
-            axes.get(axis).copied().unwrap_or_default()
-        );
-        for change in row {
-            let depth = (change.abs() / FULL).min(1.0);
-            // Blue closes, orange opens: told apart by the colour-blind, too.
-            let hue = if *change > 0.0 {
-                "0,114,178"
-            } else {
-                "213,94,0"
-            };
-            let ink = if depth > 0.6 { "#fff" } else { "#111" };
-            let _ = write!(
-                text,
-                "<td style=\"background:rgba({hue},{depth:.2});color:{ink}\">{change:+.0}</td>"
-            );
-        }
+    let influence = &shown.judgement.influence;
+    let heads = |names: &[&str]| -> String {
+        names
+            .iter()
+            .map(|name| format!("<th>{name}</th>"))
+            .collect()
+    };
+    let mut text = format!(
+        "<table class=\"matrix\"><tr><th></th>{}</tr>",
+        heads(&CAUSES)
+    );
+    for (axis, row) in axes.iter().zip(&influence.mean) {
+        let _ = write!(text, "<tr><th>{axis}</th>");
+        row.iter().for_each(|change| text.push_str(&cell(*change)));
         text.push_str("</tr>");
     }
     text.push_str("</table><ul>");
-    for sentence in shown.judgement.influence.words() {
+    for sentence in influence.words() {
         let _ = write!(text, "<li>{}</li>", escaped(&sentence));
     }
-    text.push_str("</ul>");
+    let _ = write!(
+        text,
+        "</ul><details><summary>each joint alone</summary><table class=\"matrix\"><tr><th></th>{}</tr>",
+        heads(axes)
+    );
+    for (joint, name) in JOINT_NAMES.iter().enumerate() {
+        let _ = write!(text, "<tr><th>{name}</th>");
+        for row in &influence.joints {
+            text.push_str(&cell(row[joint]));
+        }
+        text.push_str("</tr>");
+    }
+    text.push_str("</table></details>");
     text
+}
+
+/// A change, counts, on a ground of its own.
+fn cell(change: f32) -> String {
+    let depth = (change.abs() / FULL).min(1.0);
+    // Blue closes, orange opens: told apart by the colour-blind, too.
+    let hue = if change > 0.0 {
+        "0,114,178"
+    } else {
+        "213,94,0"
+    };
+    let ink = if depth > 0.6 { "#fff" } else { "#111" };
+    format!("<td style=\"background:rgba({hue},{depth:.2});color:{ink}\">{change:+.0}</td>")
 }
 
 /// How far the gripper is reached.

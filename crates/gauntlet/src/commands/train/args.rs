@@ -116,7 +116,7 @@ pub struct Train {
     /// [default: glorot; 0.03 for several starts of other domains than hands].
     #[arg(long, value_name = "DEVIATION|glorot", value_parser = initialisation)]
     pub normal: Option<Initialisation>,
-    /// Seed of everything random: the same seed trains the same map.
+    /// Seed of everything random: the same seed trains the same map (with --live of as many starts, which it says).
     #[arg(long, value_name = "N", default_value_t = 1)]
     pub seed: u64,
     /// Share of the rows that measure the result and do not train (0 to 0.9).

@@ -245,7 +245,8 @@ function headline() {
   put("state", state.words);
   $("state").dataset.tone = state.tone;
   put("clutch-words", words);
-  speak([state.words, words].filter(Boolean).join(", "));
+  const teach = picture?.teach;
+  speak([state.words, words, teach && (teach.refused || teach.words)].filter(Boolean).join(", "));
 }
 
 function clutchBar() {

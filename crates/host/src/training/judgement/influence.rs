@@ -58,6 +58,9 @@ pub enum Turned {
 pub struct Influence {
     /// Mean change over the postures, counts: one row an axis, one column a cause ([`CAUSES`]).
     pub mean: Vec<[f32; CAUSES.len()]>,
+    /// The same of each joint alone, as its angle grows.
+    #[serde(skip)]
+    pub joints: Vec<[f32; JOINT_COUNT]>,
     /// The share of postures with a strong change upwards and downwards.
     #[serde(skip)]
     ways: Vec<[[f32; 2]; CAUSES.len()]>,
@@ -72,6 +75,7 @@ impl Influence {
         let axes = model.f.outputs;
         let mut of = Self {
             mean: vec![[0.0; CAUSES.len()]; axes],
+            joints: vec![[0.0; JOINT_COUNT]; axes],
             ways: vec![[[0.0; 2]; CAUSES.len()]; axes],
             back: vec![[0.0; CAUSES.len()]; axes],
         };
@@ -100,6 +104,18 @@ impl Influence {
                     let there_and_back =
                         (b - a) * (c - b) < 0.0 && (b - a).abs().min((c - b).abs()) > STRONG;
                     of.back[axis][cause] += share * f32::from(u8::from(there_and_back));
+                }
+            }
+            for (joint, (low, high)) in ends.iter().enumerate() {
+                let at = |angle: f32| {
+                    let mut moved = posture.to_vec();
+                    moved[joint] = angle;
+                    model.map(&moved)
+                };
+                let (before, after) = (at(*low), at(*high));
+                for axis in 0..axes {
+                    let [a, b] = [&before, &after].map(|x| x[axis].clamp(0.0, 255.0));
+                    of.joints[axis][joint] += share * (b - a);
                 }
             }
         }

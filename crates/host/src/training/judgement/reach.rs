@@ -22,7 +22,12 @@ pub struct Reach {
     pub ranges: Vec<(f32, f32)>,
     /// The corners, the worst first.
     pub corners: Vec<Corner>,
+    /// A corner counts as reached within this distance of an image, counts.
+    within: f32,
 }
+
+/// A corner counts as reached within this distance in any case, counts: a twentieth of an axis.
+const NEAR: f32 = 12.75;
 
 impl Reach {
     /// Of a map on a hand's frames, radians.
@@ -39,17 +44,25 @@ impl Reach {
             })
             .collect();
         corners.sort_by(|a, b| b.nearest.total_cmp(&a.nearest));
+        // As the volume occupancy has it (Eq. 15).
+        let epsilon = space.coverage().epsilon(images.rows).unwrap_or_default();
         Self {
             ranges: images.ranges(),
             corners,
+            within: NEAR.max(epsilon.sqrt() as f32),
         }
     }
 
     /// The worst corner in words.
     pub fn words(&self) -> String {
         match self.corners.first() {
+            Some(corner) if corner.nearest > self.within => format!(
+                "{} is not reachable: nearest {:.0} counts",
+                gripper_words(&corner.counts),
+                corner.nearest
+            ),
             Some(corner) => format!(
-                "{} is reached least: nearest {:.0} counts",
+                "every corner is reached, {} least: nearest {:.0} counts",
                 gripper_words(&corner.counts),
                 corner.nearest
             ),

@@ -197,7 +197,8 @@ fn a_finger_that_never_closes_is_named_with_how_far_it_comes() {
     );
     let named = judgement.named();
     assert_eq!((named.len(), named[0].kind), (1, "short"));
-    assert!(judgement.reach.words().contains("is reached least"));
+    let words = judgement.reach.words();
+    assert!(words.contains("is not reachable"), "{words}");
 }
 
 #[test]

@@ -252,6 +252,10 @@ impl<'a> Session<'a> {
     fn say(&mut self, text: String, good: bool, tell: &Tell, drawn: bool) {
         if drawn {
             out::bell();
+            if !good {
+                // Who looks at the hand hears that it was not taken.
+                out::bell();
+            }
         } else {
             tell.say(format_args!("           {text}"));
         }
