@@ -268,6 +268,7 @@ fn after_a_power_cut_in_any_state_one_flat_pose_goes_on() {
         let state = bench.state();
         assert!(is_not_calibrated(state), "{name}: {state:?}");
         bench.release();
+        bench.run(100 * MS);
         until_flat_again(&mut bench);
         let calibration = bench.app.telemetry().calibration;
         assert!(!calibration.is_calibrated, "{name}: not by itself");
@@ -530,24 +531,29 @@ fn a_heading_that_is_far_off_is_corrected_by_a_found_flat_pose_over_a_second_at_
     bench.app.set_finds_flat(false);
     start(&mut bench, &wearer);
     until_flat_again(&mut bench);
-    // The whole index finger about the vertical: the heading across its base is off, and no other. Beyond 11° it would count as slipped.
-    slip_together(&mut bench, &[4, 5, 6], 9.0);
+    // The whole index finger about the vertical: the heading across its base is off, and no other. From 9° on the hand would not
+    // count as flat.
+    slip_together(&mut bench, &[4, 5, 6], 7.0);
     bench.run(S);
     let frames: Vec<_> = (0..20).map(|_| next_abduction(&mut bench)).collect();
     let before = mean(&frames);
     let poses = bench.app.telemetry().poses;
     bench.app.set_finds_flat(true);
-    bench.until("a pose", |b| b.app.telemetry().poses != poses);
+    let end = bench.now() + 70 * S;
+    while bench.app.telemetry().poses == poses {
+        assert!(bench.now() < end, "no flat pose was found");
+        bench.step();
+    }
     let taken = bench.app.telemetry().now.as_ticks();
     let report = bench.app.telemetry().pose.expect("taken");
     let off = report.off[4].to_degrees().abs();
-    assert!(report.found && (7.0..11.0).contains(&off), "{off}°");
+    assert!(report.found && (5.0..9.0).contains(&off), "{off}°");
     let mut frames: Vec<(u64, f32)> = Vec::new();
     while frames.last().is_none_or(|(at, _)| *at < taken + 6 * S) {
         frames.push(next_abduction(&mut bench));
     }
     let corrected = mean(&frames[frames.len() - 20..]) - before;
-    assert!(corrected.abs() > 3.0, "{corrected}°");
+    assert!(corrected.abs() > 2.0, "{corrected}°");
     let most = |(_, angle): &&(u64, f32)| (angle - before) / corrected >= 0.9;
     let entered = frames.iter().find(most).map(|(at, _)| at - taken);
     println!("{corrected}° of {off}°, nine tenths of it after {entered:?} µs");
