@@ -345,6 +345,7 @@ model = \"mine.safetensors\"
         "normal",
         "normalise",
         "on-chip",
+        "gripper-tcp",
         "open",
         "openxr",
         "out",
