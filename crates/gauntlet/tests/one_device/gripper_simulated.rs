@@ -3,9 +3,7 @@
 use crate::support;
 
 use support::told::started;
-use support::{
-    Simulation, finish, interrupt, json, model, refusal, run, start, text, until_line, wait,
-};
+use support::{Simulation, interrupt, json, model, refusal, run, start, until_line, wait};
 
 fn bench(verb: &[&str], place: &str) -> std::process::Output {
     run(&[&["gripper"], verb, &["--gripper", place]].concat())
@@ -136,15 +134,11 @@ fn a_gripper_that_leaves_the_network_while_it_is_driven_is_told() {
 fn watch_on_the_network_shows_changes_until_its_time_is_over() {
     let mut simulation = Simulation::with(false, Some("tcp:127.0.0.1:0"), &[]);
     let place = simulation.gripper_place();
-    let watch = start(&["gripper", "watch", "--seconds", "4", "--gripper", &place]);
+    let mut watch = start(&["gripper", "watch", "--seconds", "4", "--gripper", &place]);
+    let said = until_line(watch.stdout.take().unwrap(), "not activated");
     json(&bench(&["activate", "--json"], &place));
-    let output = finish(watch);
-    let said = text(&output.stdout);
-    println!("{said}");
-    assert_eq!(output.status.code(), Some(0));
-    assert!(
-        said.contains("not activated") && said.contains("activating"),
-        "{said}"
-    );
+    assert_eq!(wait(&mut watch).code(), Some(0));
+    let said = said.join().unwrap();
+    assert!(said.contains("activating"), "{said}");
     assert_eq!(simulation.end(), Some(0));
 }
