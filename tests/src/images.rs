@@ -1,11 +1,41 @@
-//! Weights images of maps that nobody trained.
+//! Weights images of maps: hand-written and random ones, and one that was trained.
 
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+use host::interrupt::Interrupt;
+use host::training::motion::Motion;
+use host::training::{Request, train};
+use trainer::algorithm::Schedule;
+use trainer::hand::Space;
+
 /// Inputs, hidden units and outputs of the map that the bridge runs.
 pub const SHAPE: [usize; 3] = [25, bridge::HIDDEN, 4];
+
+/// A map as the tool trains it, of generated motion: one start of the fast schedule.
+///
+/// # Panics
+/// Where nothing can be trained.
+pub fn trained(space: Space, seed: u64) -> Vec<u8> {
+    let outcome = train(
+        &Request {
+            space,
+            motion: &Motion::Generated { seed },
+            schedule: Schedule::Fast,
+            epochs: None,
+            pairs: 8,
+            start_pairs: true,
+            seed,
+            within: None,
+            reporter: &host::report::Nobody,
+        },
+        &Interrupt::never().expect("an interrupt"),
+    )
+    .expect("a map");
+    println!("seed {seed}: {:?}", outcome.quality);
+    host::training::model::image(&outcome.model).expect("an image")
+}
 
 /// A map whose fingers close with the index finger; `number` makes images differ and is their model id.
 pub fn index_finger(number: u32) -> Vec<u8> {

@@ -11,13 +11,12 @@ use glove::scan::Scanner;
 use gripper::Activation;
 use gripper::driver::ThreeFinger;
 use host::interrupt::Interrupt;
-use host::training::motion::Motion;
-use host::training::{Request, train};
 use loop_tests::bench::{self, Devices, Machine};
+use loop_tests::images;
 use rig::gripper::{Family, VirtualGripper};
 use rig::person::{Attitude, Person, Task};
 use rig::{Clock, PoseSource};
-use trainer::algorithm::Schedule;
+use trainer::hand::Space;
 use trainer::hand::motion::Generator;
 
 const SEED: u64 = 1;
@@ -144,27 +143,8 @@ impl Bench {
     }
 }
 
-fn trained() -> Vec<u8> {
-    let outcome = train(
-        &Request {
-            space: trainer::hand::Space::ThreeFinger,
-            motion: &Motion::Generated { seed: SEED },
-            schedule: Schedule::Fast,
-            epochs: None,
-            pairs: 8,
-            start_pairs: true,
-            seed: SEED,
-            within: None,
-            reporter: &host::report::Nobody,
-        },
-        &Interrupt::never().expect("an interrupt"),
-    )
-    .expect("a map");
-    host::training::model::image(&outcome.model).expect("an image")
-}
-
 fn open_and_closed(seeds: impl Iterator<Item = u64>) {
-    let image = trained();
+    let image = images::trained(Space::ThreeFinger, SEED);
     let hand = Generator::new(&LIMITS, SEED);
     let mut wrong = Vec::new();
     for seed in seeds {

@@ -7,15 +7,12 @@ use gripper::Gripper;
 use gripper::driver::TwoFinger;
 use gripper::registers::two_finger::Model;
 use hae::image::{JointOrder, Meta, Parameters, encode, encoded_len};
-use host::interrupt::Interrupt;
-use host::training::motion::Motion;
-use host::training::{Request, train};
 use loop_tests::bench::{Devices, empty_store};
+use loop_tests::images;
 use loop_tests::nor_slot::NorSlot;
 use rig::glove::VirtualGlove;
 use rig::gripper::{Family, VirtualGripper};
 use rig::{Clock, MemoryWire};
-use trainer::algorithm::Schedule;
 use trainer::hand::Space;
 use trainer::hand::motion::Generator;
 
@@ -74,27 +71,6 @@ fn image(outputs: usize) -> Vec<u8> {
     let mut bytes = vec![0; encoded_len(25, HIDDEN, outputs)];
     encode(&parameters, &meta, &mut bytes).expect("a sound image");
     bytes
-}
-
-/// A trained map of one axis, as the tool makes it of generated motion.
-fn trained() -> Vec<u8> {
-    let outcome = train(
-        &Request {
-            space: Space::OneAxis,
-            motion: &Motion::Generated { seed: SEED },
-            schedule: Schedule::Fast,
-            epochs: None,
-            pairs: 8,
-            start_pairs: true,
-            seed: SEED,
-            within: None,
-            reporter: &host::report::Nobody,
-        },
-        &Interrupt::never().expect("an interrupt"),
-    )
-    .expect("a map");
-    println!("seed {SEED}: {:?}", outcome.quality);
-    host::training::model::image(&outcome.model).expect("an image")
 }
 
 fn hand(closed: f32) -> [f32; 25] {
@@ -217,7 +193,7 @@ fn open_and_fist(image: &[u8], model: Model, family: Family, half: u64) -> (Vec<
 
 #[test]
 fn an_open_hand_opens_a_two_finger_gripper_a_fist_closes_it_and_100_cycles_a_second_are_held() {
-    let image = trained();
+    let image = images::trained(Space::OneAxis, SEED);
     for (model, family, half) in [
         (Model::TwoFinger85, Family::TwoFinger85, 55),
         (Model::TwoFinger140, Family::TwoFinger140, 6),

@@ -5,14 +5,12 @@ use bridge::{App, Config, Instant, Platform, State};
 use glove::hand::LIMITS;
 use glove::scan::Scanner;
 use gripper::driver::ThreeFinger;
-use host::interrupt::Interrupt;
-use host::training::motion::Motion;
-use host::training::{Request, train};
 use loop_tests::bench::{self, Devices, Machine};
+use loop_tests::images;
 use rig::Clock;
 use rig::glove::VirtualGlove;
 use rig::gripper::VirtualGripper;
-use trainer::algorithm::Schedule;
+use trainer::hand::Space;
 use trainer::hand::motion::Generator;
 
 const SEED: u64 = 1;
@@ -96,23 +94,7 @@ impl Bench {
 
 #[test]
 fn open_hand_ends_as_an_open_gripper_and_fist_as_a_closed_one() {
-    let outcome = train(
-        &Request {
-            space: trainer::hand::Space::ThreeFinger,
-            motion: &Motion::Generated { seed: SEED },
-            schedule: Schedule::Fast,
-            epochs: None,
-            pairs: 8,
-            start_pairs: true,
-            seed: SEED,
-            within: None,
-            reporter: &host::report::Nobody,
-        },
-        &Interrupt::never().unwrap(),
-    )
-    .unwrap();
-    println!("seed {SEED}: {:?}", outcome.quality);
-    let image = host::training::model::image(&outcome.model).unwrap();
+    let image = images::trained(Space::ThreeFinger, SEED);
     let hand = Generator::new(&LIMITS, SEED);
 
     let mut bench = Bench::new(&image, hand.flat_hand());

@@ -1,8 +1,8 @@
 //! Whether maps depend on luck: every data set trained as `train` does it, over many seeds, held to what each must reach.
 //!
 //! `cargo run --release -p paper --example goals -- FOLDER [SEEDS [DATA…]]`, 30 seeds if nothing is said (of 30 or more, SP1 has
-//! 100: its folds are rare), of `sp1` to `sp4`, `same-hand`, `hand`, or a recording's CSV; all but that if nothing is said. Each map is a line of `FOLDER/DATA.csv`, written as soon as it is there: the same command goes on
-//! after a stop. At the end a table in Markdown on standard output. Seeds are trained side by side, one thread each.
+//! 100: its folds are rare), of `sp1` to `sp4`, `same-hand`, `hand`, or a recording's CSV; all but that if nothing is said. Each map
+//! is a line of `FOLDER/DATA.csv`, written as soon as it is there: the same command goes on after a stop. At the end a table in Markdown on standard output. Seeds are trained side by side, one thread each.
 
 #[path = "common/domain.rs"]
 mod domain;

@@ -4,8 +4,8 @@
 //! belong to samples, *hidden lanes* (16 hidden units side by side, samples broadcast) where they belong to weights. Both add in
 //! the same order, so both see the same activations. Hidden units are padded to a multiple of 16 with zeros, which stay zero.
 //!
-//! Square roots are `f32::sqrt` here, not libm's: that is always the instruction of SSE, and each between AVX's own costs an Intel
-//! processor some hundred cycles (docs/measurements/trainer.md).
+//! Square roots are `f32::sqrt` here, not libm's: that is always the instruction of SSE, which between AVX's own made a training
+//! take three times as long on an Intel processor (docs/measurements/trainer.md).
 
 pub(crate) mod affine;
 pub(crate) mod boxes;

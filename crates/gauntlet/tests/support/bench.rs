@@ -182,12 +182,30 @@ impl Bench {
             .collect()
     }
 
-    /// When a command that rests on no sample first left after `since`, by the stamps of the finished log.
-    pub fn held_after(&self, since: SystemTime) -> SystemTime {
-        self.logged_at_times("/gripper/command")
-            .find(|(at, command)| *at >= since && command["age_us"].is_null())
-            .expect("a hold in the log")
-            .0
+    /// What finger A was seen to reach is in the finished log, one after the other.
+    pub fn assert_logged(&self, seen: &[f64]) {
+        let positions = self.logged("/gripper/status");
+        let mut logged = positions
+            .iter()
+            .filter_map(|status| status["gPOA"].as_f64());
+        for number in seen {
+            let is_there = logged.any(|logged| logged == *number);
+            assert!(
+                is_there,
+                "{number} of {seen:?} is not in the log, or not then"
+            );
+        }
+    }
+
+    /// A command that rests on no sample left soon after `closed`, by the stamps of the finished log.
+    pub fn assert_held_within_half_a_second_of(&self, closed: SystemTime) {
+        let (at, _) = self
+            .logged_at_times("/gripper/command")
+            .find(|(at, command)| *at >= closed && command["age_us"].is_null())
+            .expect("a hold in the log");
+        let later = at.duration_since(closed).unwrap();
+        println!("the hold left {} ms later", later.as_millis());
+        assert!(later <= Duration::from_millis(500), "{later:?}");
     }
 
     fn logged_at_times(

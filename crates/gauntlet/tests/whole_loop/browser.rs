@@ -305,20 +305,8 @@ fn a_person_at_a_browser_drives_the_gripper_sees_where_it_is_and_by_leaving_the_
     std::thread::sleep(Duration::from_millis(600));
     support::interrupt(&running.0);
     ends_soon(&mut running.0);
-    let held = bench.held_after(closed).duration_since(closed).unwrap();
-    println!("a page left: the hold left {} ms later", held.as_millis());
-    assert!(held <= Duration::from_millis(500), "{held:?}");
-    let positions = bench.logged("/gripper/status");
-    let mut logged = positions
-        .iter()
-        .filter_map(|status| status["gPOA"].as_f64());
-    for number in &seen {
-        let is_there = logged.any(|logged| logged == *number);
-        assert!(
-            is_there,
-            "{number} of {seen:?} is not in the log, or not then"
-        );
-    }
+    bench.assert_held_within_half_a_second_of(closed);
+    bench.assert_logged(&seen);
 }
 
 /// Every state that the page knows, at the width of a desk and of a phone, as pictures to look at: `PAGE_PICTURES` names the folder.

@@ -295,21 +295,9 @@ fn one_page_holds_the_clutch_and_closing_it_opens_the_clutch_which_nobody_else_h
     );
     ends_soon(&mut running.0);
     // What docs/view.md promises of a page that is closed.
-    let held = bench.held_after(closed).duration_since(closed).unwrap();
-    println!("a closed page: the hold left {} ms later", held.as_millis());
-    assert!(held <= Duration::from_millis(500), "{held:?}");
+    bench.assert_held_within_half_a_second_of(closed);
     // The page's numbers are the log's, one after the other.
-    let positions = bench.logged("/gripper/status");
-    let mut logged = positions
-        .iter()
-        .filter_map(|status| status["gPOA"].as_f64());
-    for number in &seen {
-        let is_there = logged.any(|logged| logged == *number);
-        assert!(
-            is_there,
-            "{number} of {seen:?} is not in the log, or not then"
-        );
-    }
+    bench.assert_logged(&seen);
 }
 
 #[test]
