@@ -2,7 +2,8 @@
 //! are worth while, when they can be told apart, and by what.
 //!
 //! `cargo run --release -p paper --example starts -- sp2 fast 1-8 12 0.03 >> starts.csv`: data (sp1 to sp4, hand, or a recording),
-//! schedule (`fast`, `paper`, or `fast,NAME=VALUE,…`), seeds, starts a seed, deviation of normal weights or `glorot`. One line for each
+//! schedule (`fast`, `paper`, or `fast,NAME=VALUE,…`, a number of the
+//! schedule or of the cost), seeds, starts a seed, deviation of normal weights or `glorot`. One line for each
 //! look at each start: at the end of the early stages, before λ3 rises, half risen, risen, thrice between, and at the end; with the
 //! measures of its end on held-out samples. Other words for the starts:
 //! - `apart12`: the same, and a target near one that was shown counts as covered (as where a person teaches);
@@ -34,12 +35,14 @@ const EACH: &str =
 const PAIRS: &str = "data,schedule,normal,seed,start,pair,size,gap,apart,other,target";
 const BEST: &str = "data,schedule,normal,seed,starts,taken,d,vo,dknn,nmse,s,costs";
 
-fn plan(word: &str, dimensions: usize) -> Result<Plan> {
+/// The settings by the schedule's word.
+fn scheduled(mut settings: Settings, word: &str, dimensions: usize) -> Result<Settings> {
     let mut words = word.split(',');
     let mut plan = match words.next() {
         Some("paper") => Schedule::Paper.plan_for(dimensions),
         _ => Schedule::Fast.plan_for(dimensions),
     };
+    let lambda = &mut settings.lambda;
     for word in words {
         let (name, value) = word.split_once('=').ok_or("NAME=VALUE")?;
         let number: f64 = value.parse()?;
@@ -52,11 +55,16 @@ fn plan(word: &str, dimensions: usize) -> Result<Plan> {
             "start" => plan.ramp_start = number as usize,
             "ramp" => plan.ramp_epochs = number as usize,
             "batches" => plan.batches = number as usize,
+            "distortion" => lambda.distortion = number,
+            "pin" => lambda.pin = number,
+            "attraction" => lambda.attraction = number,
+            "alpha" => lambda.alpha = number,
             "cool" => plan.cooling_epochs = number as usize,
             _ => return Err(format!("unknown part of a schedule: {name}").into()),
         }
     }
-    Ok(plan)
+    settings.schedule = Schedule::Custom(plan);
+    Ok(settings)
 }
 
 fn list(row: &[f32]) -> Vec<f64> {
@@ -317,9 +325,8 @@ fn main() -> Result<()> {
     for seed in first.parse::<u64>()?..=last.parse::<u64>()? {
         for number in 0..if each { count } else { 1 } {
             let mut domain = domain(data, seed)?;
-            let mut settings = domain.settings.clone();
-            let plan = plan(schedule, domain.targets.cols)?;
-            settings.schedule = Schedule::Custom(plan);
+            let settings = domain.settings.clone();
+            let mut settings = scheduled(settings, schedule, domain.targets.cols)?;
             settings.threads = 1;
             settings.seed = start_seed(seed, number);
             if let Ok(deviation) = normal.parse() {

@@ -72,7 +72,7 @@ impl Starts {
     ) -> Result<Self, Error> {
         let count = several.count.max(1);
         let plan = settings.schedule.plan_for(x.cols);
-        let cuts = Cut::all(&plan, settings.pairs.count(), count);
+        let cuts = Cut::all(&plan, settings.pairs.count(), (count, several.finalists));
         let settings = settings.clone();
         let runners: Result<Vec<Runner>, Error> = (0..count)
             .map(|number| {
@@ -255,7 +255,8 @@ impl Starts {
         let trainer = &self.runners[self.best()].trainer;
         let plan = self.settings.schedule.plan_for(self.x.cols);
         let seconds = |count: usize| {
-            let cuts = Cut::all(&plan, self.settings.pairs.count(), count);
+            let finalists = self.several.finalists;
+            let cuts = Cut::all(&plan, self.settings.pairs.count(), (count, finalists));
             cuts::seconds((&cuts, count), (0, 0), (threads, now), &|epochs| {
                 trainer.seconds(epochs)
             })

@@ -19,18 +19,19 @@ impl Cut {
     ///
     /// Where λ3 is about to rise, reconstruction and distortion show the maps that the pairs have creased: an eighth of the time is
     /// spent then. Half risen, the whole cost begins to say which will be cheap; at the full λ3 the order is nearly that of the end
-    /// (docs/measurements/starts.md), and a sixth goes to it.
+    /// (docs/measurements/starts.md), and the `finalists` go to it, at most half of all.
     #[must_use]
-    pub fn all(plan: &Plan, pairs: usize, count: usize) -> Vec<Self> {
+    pub fn all(plan: &Plan, pairs: usize, (count, finalists): (usize, usize)) -> Vec<Self> {
         let last = plan.stage_epochs * pairs;
         let total = last + plan.last_epochs;
         let before = (last + plan.ramp_start).min(total);
         let rising = (last + plan.ramp_start + plan.ramp_epochs / 2).min(total);
         let risen = (last + plan.ramp_start + plan.ramp_epochs).min(total);
+        let half = count.div_ceil(2).max(1);
         let cuts = [
             (before, (2 * count).div_ceil(3)),
-            (rising, count.div_ceil(2)),
-            (risen, count.div_ceil(6)),
+            (rising, half),
+            (risen, finalists.clamp(1, half)),
             (total, 1),
         ];
         let mut live = count.max(1);
@@ -98,7 +99,7 @@ mod tests {
         for count in 1..40 {
             for schedule in [Schedule::Fast, Schedule::Paper] {
                 let plan = schedule.plan_for(2);
-                let cuts = Cut::all(&plan, 4, count);
+                let cuts = Cut::all(&plan, 4, (count, 6));
                 assert!(
                     cuts.windows(2)
                         .all(|w| w[0].epoch < w[1].epoch && w[0].keep >= w[1].keep)
@@ -114,12 +115,24 @@ mod tests {
                 );
             }
         }
-        assert_eq!(Cut::all(&Schedule::Fast.plan_for(2), 4, 1).len(), 1);
+        assert_eq!(Cut::all(&Schedule::Fast.plan_for(2), 4, (1, 6)).len(), 1);
+    }
+
+    #[test]
+    fn the_finalists_are_left_for_the_last_stretch_but_never_more_than_half_of_all() {
+        let last_stretch = |count, finalists| {
+            let cuts = Cut::all(&Schedule::Fast.plan_for(3), 4, (count, finalists));
+            cuts.iter().rev().nth(1).map(|cut| cut.keep)
+        };
+        assert_eq!(last_stretch(12, 6), Some(6));
+        assert_eq!(last_stretch(6, 1), Some(1));
+        assert_eq!(last_stretch(5, 6), Some(3));
+        assert_eq!(last_stretch(2, 0), Some(1));
     }
 
     #[test]
     fn the_cuts_of_the_fast_schedule_are_those_that_were_measured() {
-        let cuts = Cut::all(&Schedule::Fast.plan_for(2), 4, 32);
+        let cuts = Cut::all(&Schedule::Fast.plan_for(2), 4, (32, 6));
         let told: Vec<(usize, usize, bool)> = (cuts.iter())
             .map(|cut| (cut.epoch, cut.keep, cut.attraction))
             .collect();

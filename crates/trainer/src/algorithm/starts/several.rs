@@ -21,6 +21,8 @@ pub enum Judge {
 pub struct Several {
     /// Starts, at least one.
     pub count: usize,
+    /// So many of them come to the last epoch (at most half of all, at least one); of these the most typical cheap one is taken.
+    pub finalists: usize,
     /// By what they are judged.
     pub judge: Judge,
 }
@@ -29,6 +31,7 @@ impl Several {
     /// One start: Algorithm 1 as it stands.
     pub const ONE: Self = Self {
         count: 1,
+        finalists: 1,
         judge: Judge::Cost,
     };
 }

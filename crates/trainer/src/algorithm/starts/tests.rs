@@ -15,6 +15,7 @@ fn settings(threads: usize) -> Settings {
 fn several(count: usize) -> Several {
     Several {
         count,
+        finalists: 1,
         judge: Judge::Cost,
     }
 }

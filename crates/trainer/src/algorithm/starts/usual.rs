@@ -9,6 +9,8 @@ use crate::network::Initialisation;
 pub struct Usual {
     /// Starts.
     pub count: usize,
+    /// [`Several::finalists`].
+    pub finalists: usize,
     /// How the weights start.
     pub initialisation: Initialisation,
     /// [`Plan::stage_reconstruction`].
@@ -21,18 +23,20 @@ impl Usual {
     /// For planes.
     pub const PLANE: Self = Self {
         count: 32,
+        finalists: 6,
         initialisation: Initialisation::Normal(0.03),
         stage_reconstruction: 1.0,
         judge: Judge::Cost,
     };
-    /// For surfaces in space and more dimensions that no hand is in; they take longer.
+    /// For surfaces in space and more dimensions that no hand is in; they take longer, and hardly ever fold.
     pub const SURFACE: Self = Self {
-        count: 16,
+        count: 12,
         ..Self::PLANE
     };
     /// For hands.
     pub const HAND: Self = Self {
         count: 6,
+        finalists: 1,
         initialisation: Initialisation::Glorot,
         stage_reconstruction: 1.0,
         judge: Judge::CostInTarget,
@@ -43,6 +47,7 @@ impl Usual {
     pub const fn several(&self, count: usize) -> Several {
         Several {
             count,
+            finalists: self.finalists,
             judge: self.judge,
         }
     }
