@@ -30,6 +30,7 @@ use crate::kernel::Blocks;
 use crate::measures::{NEIGHBOURS, fold_factor, gap_factor};
 use crate::neighbours::{farthest, rows};
 use crate::network::Network;
+use crate::optimizer::{LearningRate, Nadam};
 use crate::random::Random;
 use clock::Clock;
 use core::ops::Range;
@@ -44,6 +45,11 @@ const FOLD: f64 = 5.0;
 const GAP: f64 = 3.0;
 /// A look at the map takes time with the square of the samples.
 const MOST_LOOKED_AT: usize = 2000;
+
+/// Steps of [`Trainer::draw_to`], whose rate falls in a straight line to nothing: the images are met to a hundredth of what maps
+/// differ by (docs/measurements/starts.md).
+const DRAWING_STEPS: usize = 300;
+const DRAWING_RATE: f64 = 1e-3;
 
 /// Where the training stands.
 #[derive(Clone, Debug)]
@@ -246,6 +252,34 @@ impl Trainer {
             epochs: self.epoch,
             parts: self.parts,
         }
+    }
+
+    /// Draws f to `images` of the training inputs, one a row, and g the way back: Pin alone, over all of them. Whatever comes later
+    /// goes on from there.
+    fn draw_to(&mut self, images: &Matrix) {
+        let weights = Weights {
+            reconstruction: 0.0,
+            distortion: 0.0,
+            pin: 1.0,
+            attraction: 0.0,
+            alpha: self.settings.lambda.alpha,
+        };
+        let before = self.engine.nadam().clone();
+        let fresh = Nadam::new(self.engine.parameters().len());
+        self.engine
+            .restore(self.engine.parameters().to_vec(), fresh);
+        self.engine.set_pairs(&self.q, images);
+        for step in 0..DRAWING_STEPS {
+            let rate = LearningRate {
+                initial: DRAWING_RATE * (DRAWING_STEPS - step) as f64 / DRAWING_STEPS as f64,
+                ..LearningRate::PAPER
+            };
+            self.engine.step(&weights, 0, &rate);
+        }
+        self.engine
+            .restore(self.engine.parameters().to_vec(), before);
+        self.engine
+            .set_pairs(&self.pairs.inputs, &self.pairs.targets);
     }
 
     /// That it was ended after so many epochs, of which nothing else is known.

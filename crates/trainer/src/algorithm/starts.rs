@@ -8,11 +8,11 @@
 
 mod checkpoint;
 mod cuts;
+mod midst;
 mod runner;
 mod several;
 #[cfg(test)]
 mod tests;
-mod typical;
 mod usual;
 
 pub use cuts::Cut;
@@ -26,8 +26,8 @@ use crate::pool::Pool;
 use crate::random::Random;
 use core::ops::ControlFlow;
 use core::time::Duration;
+use midst::{image, midst};
 use runner::{Runner, judging};
-use typical::{image, most_typical};
 
 /// Random numbers of the seeds of further starts.
 const SEED_STREAM: u64 = 0x5354_4152;
@@ -320,14 +320,19 @@ impl Starts {
                 .unwrap_or(f64::INFINITY)
                 .total_cmp(&b.cost.unwrap_or(f64::INFINITY))
         });
-        if self.made + 1 == self.cuts.len() {
+        if cut.joins {
             let cheapest = live.first().and_then(|runner| runner.cost);
             let bound = cheapest.unwrap_or(f64::INFINITY) * CHEAP;
             let cheap = |runner: &&&mut Runner| runner.cost.is_some_and(|cost| cost <= bound);
             let images: Vec<Vec<f32>> = (live.iter().take_while(cheap))
                 .map(|runner| image(&runner.trainer.networks().f, q))
                 .collect();
-            live.swap(0, most_typical(&images));
+            let (nearest, mean) = midst(&images, self.x.cols);
+            live.swap(0, nearest);
+            if let (Some(first), Some(mean)) = (live.first_mut(), mean) {
+                let mean = Matrix::from_vec(q.rows, self.x.cols, mean).unwrap_or_default();
+                first.trainer.draw_to(&mean);
+            }
         }
         for runner in live.into_iter().skip(cut.keep.max(1)) {
             runner.is_live = false;

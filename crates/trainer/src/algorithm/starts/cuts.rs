@@ -12,6 +12,8 @@ pub struct Cut {
     pub keep: usize,
     /// Whether the attraction counts: not before λ3 has begun to rise, when nothing has worked on it yet.
     pub attraction: bool,
+    /// Whether the one that goes on is drawn to the midst of all that cost about as little.
+    pub joins: bool,
 }
 
 impl Cut {
@@ -27,23 +29,27 @@ impl Cut {
         let before = (last + plan.ramp_start).min(total);
         let rising = (last + plan.ramp_start + plan.ramp_epochs / 2).min(total);
         let risen = (last + plan.ramp_start + plan.ramp_epochs).min(total);
+        let joined = (risen + 3 * total) / 4;
         let half = count.div_ceil(2).max(1);
         let cuts = [
-            (before, (2 * count).div_ceil(3)),
-            (rising, half),
-            (risen, finalists.clamp(1, half)),
-            (total, 1),
+            (before, (2 * count).div_ceil(3), false),
+            (rising, half, false),
+            (risen, finalists.clamp(1, half), false),
+            (joined, 1, true),
+            (total, 1, true),
         ];
         let mut live = count.max(1);
         let mut kept: Vec<Self> = Vec::new();
-        for (epoch, keep) in cuts {
+        for (epoch, keep, last) in cuts {
             let follows = kept.last().is_none_or(|cut| cut.epoch < epoch);
             if (keep < live && follows && epoch > 0) || epoch == total {
                 kept.retain(|cut| cut.epoch < epoch);
+                let running = kept.last().map_or(count, |cut| cut.keep);
                 kept.push(Self {
                     epoch,
                     keep,
                     attraction: epoch > before,
+                    joins: last && running > 1,
                 });
                 live = keep;
             }
@@ -110,7 +116,8 @@ mod tests {
                     Some(&Cut {
                         epoch: total,
                         keep: 1,
-                        attraction: true
+                        attraction: true,
+                        joins: false,
                     })
                 );
             }
@@ -119,37 +126,52 @@ mod tests {
     }
 
     #[test]
+    fn several_finalists_are_joined_once_also_where_a_training_is_too_short_for_it() {
+        for epochs in [1, 2, 8, 100] {
+            for count in 1..13 {
+                let plan = Schedule::Fast.plan_for(2).with_last_epochs(epochs);
+                let cuts = Cut::all(&plan, 4, (count, 6));
+                let joins: Vec<&Cut> = cuts.iter().filter(|cut| cut.joins).collect();
+                // Two and fewer starts have one finalist.
+                let once = usize::from(count > 2);
+                assert_eq!(joins.len(), once, "{count} starts, {epochs}: {cuts:?}");
+                assert!(joins.iter().all(|cut| cut.keep == 1));
+            }
+        }
+    }
+
+    #[test]
     fn the_finalists_are_left_for_the_last_stretch_but_never_more_than_half_of_all() {
         let last_stretch = |count, finalists| {
             let cuts = Cut::all(&Schedule::Fast.plan_for(3), 4, (count, finalists));
-            cuts.iter().rev().nth(1).map(|cut| cut.keep)
+            cuts.iter().rev().nth(2).map(|cut| cut.keep)
         };
         assert_eq!(last_stretch(12, 6), Some(6));
-        assert_eq!(last_stretch(6, 1), Some(1));
         assert_eq!(last_stretch(5, 6), Some(3));
-        assert_eq!(last_stretch(2, 0), Some(1));
+        assert_eq!(last_stretch(6, 2), Some(2));
     }
 
     #[test]
     fn the_cuts_of_the_fast_schedule_are_those_that_were_measured() {
         let cuts = Cut::all(&Schedule::Fast.plan_for(2), 4, (32, 6));
-        let told: Vec<(usize, usize, bool)> = (cuts.iter())
-            .map(|cut| (cut.epoch, cut.keep, cut.attraction))
+        let told: Vec<(usize, usize, bool, bool)> = (cuts.iter())
+            .map(|cut| (cut.epoch, cut.keep, cut.attraction, cut.joins))
             .collect();
         // 1,200 early epochs; λ3 rises from 2,000 to 2,500.
         let want = [
-            (2000, 22, false),
-            (2250, 16, true),
-            (2500, 6, true),
-            (4200, 1, true),
+            (2000, 22, false, false),
+            (2250, 16, true, false),
+            (2500, 6, true, false),
+            (3775, 1, true, true),
+            (4200, 1, true, false),
         ];
         assert_eq!(told, want);
-        // Where a step with attraction costs six without: 12 whole trainings, of 15,200 each.
+        // Where a step with attraction costs six without: 11 whole trainings, of 15,200 each.
         let price = |epochs: Range<usize>| {
             let with = epochs.end.max(2000) - epochs.start.max(2000);
             (epochs.len() - with + 6 * with) as f64
         };
-        assert_eq!(seconds((&cuts, 32), (0, 0), (1, 1), &price), 182_200.0);
+        assert_eq!(seconds((&cuts, 32), (0, 0), (1, 1), &price), 169_450.0);
     }
 
     #[test]
@@ -159,6 +181,7 @@ mod tests {
             epoch,
             keep: 1,
             attraction: true,
+            joins: false,
         };
         let cuts = [cut(100), cut(300)];
         let alone = |epochs: Range<usize>| epochs.len() as f64;
