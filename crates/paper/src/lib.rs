@@ -304,7 +304,7 @@ impl Cell {
         };
         let starts = match self.starts() {
             1 => String::new(),
-            starts => starts.to_string(),
+            starts => format!("{starts}-{}", self.usual().finalists),
         };
         let start = match self.initialisation {
             Initialisation::Glorot => String::new(),

@@ -43,7 +43,7 @@ const BATCH_STREAM: u64 = 0x4241_5443;
 /// From these factors on the map is said to fold, to leave targets uncovered (right maps: below 3, below 1.6).
 const FOLD: f64 = 5.0;
 const GAP: f64 = 3.0;
-/// A look at the map takes time with the square of the samples.
+/// Samples for a look at the map, which takes time with their square, and for drawing it, which nobody can interrupt.
 const MOST_LOOKED_AT: usize = 2000;
 
 /// Steps of [`Trainer::draw_to`], whose rate falls in a straight line to nothing: the images are met to a hundredth of what maps
@@ -254,8 +254,8 @@ impl Trainer {
         }
     }
 
-    /// Draws f to `images` of the training inputs, one a row, and g the way back: Pin alone, over all of them. Whatever comes later
-    /// goes on from there.
+    /// Draws f to `images` of the training inputs, one a row, and g the way back: Pin alone, over all of them or
+    /// [`MOST_LOOKED_AT`] spread over them. Whatever comes later goes on from there.
     fn draw_to(&mut self, images: &Matrix) {
         let weights = Weights {
             reconstruction: 0.0,
@@ -268,7 +268,10 @@ impl Trainer {
         let fresh = Nadam::new(self.engine.parameters().len());
         self.engine
             .restore(self.engine.parameters().to_vec(), fresh);
-        self.engine.set_pairs(&self.q, images);
+        let stride = self.q.rows.div_ceil(MOST_LOOKED_AT).max(1);
+        let some: Vec<usize> = (0..self.q.rows).step_by(stride).collect();
+        self.engine
+            .set_pairs(&self.q.select(&some), &images.select(&some));
         for step in 0..DRAWING_STEPS {
             let rate = LearningRate {
                 initial: DRAWING_RATE * (DRAWING_STEPS - step) as f64 / DRAWING_STEPS as f64,

@@ -227,6 +227,11 @@ impl Task {
         course.starts(&self.usual)
     }
 
+    /// Starts that are left when one of several is drawn to the mean of those that are alike; with one there is no mean.
+    pub fn finalists(&self) -> usize {
+        self.usual.finalists
+    }
+
     /// All epochs of all stages of one start.
     pub fn total_epochs(&self, course: &Course) -> usize {
         let plan = course.plan(self.targets.cols, &self.usual);

@@ -1,10 +1,13 @@
 //! Several starts of one training, of which the best is taken: where the weights start decides which way round an image comes to
 //! lie, and no later step turns it over.
 //!
-//! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those go
-//! on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise; of those that
-//! come to the end as cheap as the cheapest, or nearly, the one most like the others is taken (of two the cheaper). No truth is asked, no held-out sample looked at. [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out
-//! depends on the seed alone, not on threads nor on how it was driven. One start is the training of Algorithm 1 to the bit.
+//! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those
+//! go on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise. Shortly
+//! before the end one is drawn to the mean of those that cost about as little and are alike ([`midst`]), and is trained to the end.
+//! No truth is asked, no held-out sample looked at.
+//!
+//! [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out depends on
+//! the seed alone, not on threads nor on how it was driven. One start is the training of Algorithm 1 to the bit.
 
 mod checkpoint;
 mod cuts;

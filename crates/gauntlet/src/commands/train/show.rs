@@ -22,8 +22,12 @@ pub(super) fn describe(options: &Train, task: &Task, course: &Course, tell: &Tel
     ));
     let starts = task.starts(course);
     if starts > 1 {
+        let last = match task.finalists() {
+            1 => "one comes to the end",
+            _ => "one comes to the end, from the mean of its last rivals that are like it",
+        };
         tell.say(format_args!(
-            "starts     {starts}; those that cost most on the training samples end early; of the others the one most like them is taken, of two the cheaper"
+            "starts     {starts}; those that cost most on the training samples end early; {last}"
         ));
     }
     if options

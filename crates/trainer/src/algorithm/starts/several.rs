@@ -21,7 +21,8 @@ pub enum Judge {
 pub struct Several {
     /// Starts, at least one.
     pub count: usize,
-    /// So many of them come to the last epoch (at most half of all, at least one); of these the most typical cheap one is taken.
+    /// So many of them (at most half of all, at least one) are left when one is drawn to the mean of those that cost about as little and
+    /// are alike, and goes on alone. With one there is no mean.
     pub finalists: usize,
     /// By what they are judged.
     pub judge: Judge,
