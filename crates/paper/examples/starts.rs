@@ -2,9 +2,8 @@
 //! are worth while, when they can be told apart, and by what.
 //!
 //! `cargo run --release -p paper --example starts -- sp2 fast 1-8 12 0.03 >> starts.csv`: data (sp1 to sp4, hand, or a recording),
-//! schedule (`fast`, `paper`, or `fast,NAME=VALUE,…`, a number of the
-//! schedule or of the cost), seeds, starts a seed, deviation of normal weights or `glorot`. One line for each
-//! look at each start: at the end of the early stages, before λ3 rises, half risen, risen, thrice between, and at the end; with the
+//! schedule (`fast`, `paper`, or `fast,NAME=VALUE,…`, numbers of the schedule or factors of the cost), seeds, starts a seed, deviation
+//! of normal weights or `glorot`. One line for each look at each start: at the end of the early stages, before λ3 rises, half risen, risen, thrice between, and at the end; with the
 //! measures of its end on held-out samples. Other words for the starts:
 //! - `apart12`: the same, and a target near one that was shown counts as covered (as where a person teaches);
 //! - `best12`: trained as `train` does, one line a seed;

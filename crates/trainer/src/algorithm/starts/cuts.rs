@@ -12,7 +12,7 @@ pub struct Cut {
     pub keep: usize,
     /// Whether the attraction counts: not before λ3 has begun to rise, when nothing has worked on it yet.
     pub attraction: bool,
-    /// Whether the one that goes on is drawn to the midst of all that cost about as little.
+    /// Whether the one that goes on is drawn to the mean of those that cost about as little and are alike.
     pub joins: bool,
 }
 
