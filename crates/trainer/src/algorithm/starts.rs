@@ -3,7 +3,7 @@
 //!
 //! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those
 //! go on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise. Shortly
-//! before the end one is drawn to the mean of those that cost about as little and are alike ([`midst`]), and is trained to the end.
+//! before the end one is drawn to the mean of those that cost about as little and are alike, and is trained to the end.
 //! No truth is asked, no held-out sample looked at.
 //!
 //! [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out depends on
