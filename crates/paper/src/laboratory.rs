@@ -154,7 +154,7 @@ impl Laboratory {
     pub fn run(&self, cell: &Cell, watch: &dyn Watch) -> Result<Outcome, Error> {
         let mut prepared = self.prepare(cell)?;
         if cell.starts() > 1 {
-            return best_of_starts(cell, &mut prepared, watch);
+            return several_starts(cell, &mut prepared, watch);
         }
         let fail = |source| failure(cell, source);
         let mut trainer =
@@ -307,8 +307,8 @@ fn prepare_hand(cell: &Cell, frames: &Matrix, mut operator: Scripted) -> Result<
     })
 }
 
-/// Several starts, of which the best is taken; on one thread, as all cells are.
-fn best_of_starts(
+/// Several starts, of which one map comes; on one thread, as all cells are.
+fn several_starts(
     cell: &Cell,
     prepared: &mut Prepared,
     watch: &dyn Watch,

@@ -83,7 +83,7 @@ pub enum Row {
     HaeAdaptive,
     /// HAE, α = 1, with matched points of the outlines at equal distances as pairs: shapes only.
     HaeFixed,
-    /// HAE with adaptive pairs, α = 1, the best of several starts as `train` has them where nothing else is said: not in the paper.
+    /// HAE with adaptive pairs, α = 1, several starts as `train` has them where nothing else is said: not in the paper.
     HaeStarts,
 }
 

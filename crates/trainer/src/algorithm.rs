@@ -30,7 +30,7 @@ use crate::kernel::Blocks;
 use crate::measures::{NEIGHBOURS, fold_factor, gap_factor};
 use crate::neighbours::{farthest, rows};
 use crate::network::Network;
-use crate::optimizer::{LearningRate, Nadam};
+use crate::optimizer::LearningRate;
 use crate::random::Random;
 use clock::Clock;
 use core::ops::Range;
@@ -43,13 +43,14 @@ const BATCH_STREAM: u64 = 0x4241_5443;
 /// From these factors on the map is said to fold, to leave targets uncovered (right maps: below 3, below 1.6).
 const FOLD: f64 = 5.0;
 const GAP: f64 = 3.0;
-/// Samples for a look at the map, which takes time with their square, and for drawing it, which nobody can interrupt.
+/// A look at the map takes time with the square of the samples.
 const MOST_LOOKED_AT: usize = 2000;
 
-/// Steps of [`Trainer::draw_to`], whose rate falls in a straight line to nothing: the images are met to a hundredth of what maps
-/// differ by (docs/measurements/starts.md).
-const DRAWING_STEPS: usize = 300;
-const DRAWING_RATE: f64 = 1e-3;
+/// Steps of [`Trainer::fit_to`], whose rate falls in a straight line to nothing (docs/measurements/starts.md).
+const FIT_STEPS: usize = 300;
+const FIT_RATE: f64 = 1e-3;
+/// Nobody can interrupt it, so it is kept short.
+const MOST_FITTED: usize = 2000;
 
 /// Where the training stands.
 #[derive(Clone, Debug)]
@@ -254,35 +255,31 @@ impl Trainer {
         }
     }
 
-    /// Draws f to `images` of the training inputs, one a row, and g the way back: Pin alone, over all of them or
-    /// [`MOST_LOOKED_AT`] spread over them. Whatever comes later goes on from there.
-    fn draw_to(&mut self, images: &Matrix) {
+    /// Fits f to `images` of the training inputs, one a row, and g to the way back: Pin alone, over all of them or [`MOST_FITTED`]
+    /// spread over them. Whatever comes later goes on from there.
+    fn fit_to(&mut self, images: &Matrix) {
         let weights = Weights {
             reconstruction: 0.0,
             distortion: 0.0,
             pin: 1.0,
             attraction: 0.0,
-            alpha: self.settings.lambda.alpha,
+            alpha: 1.0,
         };
-        let before = self.engine.nadam().clone();
-        let fresh = Nadam::new(self.engine.parameters().len());
-        self.engine
-            .restore(self.engine.parameters().to_vec(), fresh);
-        let stride = self.q.rows.div_ceil(MOST_LOOKED_AT).max(1);
-        let some: Vec<usize> = (0..self.q.rows).step_by(stride).collect();
-        self.engine
-            .set_pairs(&self.q.select(&some), &images.select(&some));
-        for step in 0..DRAWING_STEPS {
+        let count = self.q.rows.min(MOST_FITTED);
+        let some: Vec<usize> = (0..count).map(|k| k * self.q.rows / count).collect();
+        let (q, images) = (self.q.select(&some), images.select(&some));
+        let batch = core::slice::from_ref(&images);
+        let mut fit = Engine::new(&self.networks(), &q, batch, 1);
+        fit.set_pairs(&q, &images);
+        for step in 0..FIT_STEPS {
             let rate = LearningRate {
-                initial: DRAWING_RATE * (DRAWING_STEPS - step) as f64 / DRAWING_STEPS as f64,
+                initial: FIT_RATE * (FIT_STEPS - step) as f64 / FIT_STEPS as f64,
                 ..LearningRate::PAPER
             };
-            self.engine.step(&weights, 0, &rate);
+            fit.step(&weights, 0, &rate);
         }
-        self.engine
-            .restore(self.engine.parameters().to_vec(), before);
-        self.engine
-            .set_pairs(&self.pairs.inputs, &self.pairs.targets);
+        let state = self.engine.nadam().clone();
+        self.engine.restore(fit.parameters().to_vec(), state);
     }
 
     /// That it was ended after so many epochs, of which nothing else is known.

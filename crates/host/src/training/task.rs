@@ -106,7 +106,7 @@ pub struct Course {
     pub hidden: usize,
     /// How the weights start.
     pub initialisation: Option<Initialisation>,
-    /// Starts, of which the best is taken; one is the paper's way. None said: as many as usual.
+    /// Starts, of which one map comes; one is the paper's way. None said: as many as usual.
     pub starts: Option<usize>,
     /// No more starts than are likely to end within this time; one in any case.
     pub within: Option<Duration>,
@@ -227,9 +227,9 @@ impl Task {
         course.starts(&self.usual)
     }
 
-    /// Starts that are left when one of several is drawn to the mean of those that are alike; with one there is no mean.
-    pub fn finalists(&self) -> usize {
-        self.usual.finalists
+    /// Starts of which the mean is taken in the last quarter; one: there is none.
+    pub fn finalists(&self, course: &Course) -> usize {
+        self.usual.finalists.min(self.starts(course).div_ceil(2))
     }
 
     /// All epochs of all stages of one start.

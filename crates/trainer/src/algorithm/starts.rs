@@ -1,17 +1,17 @@
-//! Several starts of one training, of which the best is taken: where the weights start decides which way round an image comes to
+//! Several starts of one training, of which one map comes: where the weights start decides which way round an image comes to
 //! lie, and no later step turns it over.
 //!
 //! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those
-//! go on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise. Shortly
-//! before the end one is drawn to the mean of those that cost about as little and are alike, and is trained to the end.
+//! go on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise. In the last
+//! quarter one is fitted to the mean of those that cost about as little and are alike, and is trained to the end.
 //! No truth is asked, no held-out sample looked at.
 //!
 //! [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out depends on
 //! the seed alone, not on threads nor on how it was driven. One start is the training of Algorithm 1 to the bit.
 
+mod agreement;
 mod checkpoint;
 mod cuts;
-mod midst;
 mod runner;
 mod several;
 #[cfg(test)]
@@ -27,9 +27,9 @@ use crate::data::Matrix;
 use crate::operator::Operator;
 use crate::pool::Pool;
 use crate::random::Random;
+use agreement::{agreement, image};
 use core::ops::ControlFlow;
 use core::time::Duration;
-use midst::{image, midst};
 use runner::{Runner, judging};
 
 /// Random numbers of the seeds of further starts.
@@ -308,6 +308,7 @@ impl Starts {
         let Some(cut) = self.cuts.get(self.made).copied() else {
             return;
         };
+        let is_before_the_end = cut.epoch < self.total();
         let weights = judging((&self.settings, self.several.judge), cut.attraction);
         let (q, x) = (&self.q, &self.x);
         let mut live: Vec<&mut Runner> = self
@@ -330,11 +331,12 @@ impl Starts {
             let images: Vec<Vec<f32>> = (live.iter().take_while(cheap))
                 .map(|runner| image(&runner.trainer.networks().f, q))
                 .collect();
-            let (nearest, mean) = midst(&images, self.x.cols);
+            let (nearest, mean) = agreement(&images, self.x.cols);
             live.swap(0, nearest);
-            if let (Some(first), Some(mean)) = (live.first_mut(), mean) {
-                let mean = Matrix::from_vec(q.rows, self.x.cols, mean).unwrap_or_default();
-                first.trainer.draw_to(&mean);
+            let mean = mean.and_then(|mean| Matrix::from_vec(q.rows, self.x.cols, mean));
+            // At the very end nothing would judge it any more.
+            if let (Some(first), Some(mean), true) = (live.first_mut(), mean, is_before_the_end) {
+                first.trainer.fit_to(&mean);
             }
         }
         for runner in live.into_iter().skip(cut.keep.max(1)) {

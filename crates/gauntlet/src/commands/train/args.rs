@@ -107,8 +107,8 @@ pub struct Train {
     /// Hidden units (1 to 65535); the bridge runs 300.
     #[arg(long, value_name = "H", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=65_535))]
     pub hidden: u32,
-    /// Starts that differ in their first weights (1 to 64): those that cost most on the training samples end early, and the last one
-    /// goes on from the mean of its rivals that are like it (a hand's has none); 1 is the paper's way [default: 32, targets of more than 2
+    /// Starts that differ in their first weights (1 to 64): those that cost most on the training samples end early; near the end
+    /// the remaining ones that agree are averaged, and one goes on from there (hands: the cheapest goes on); 1 is the paper's way [default: 32, targets of more than 2
     /// dimensions 12, hands 6, with --live as many of them as end in 20 s; 1 with --schedule paper or another --cost].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub starts: Option<u8>,

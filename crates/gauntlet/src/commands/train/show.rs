@@ -22,9 +22,9 @@ pub(super) fn describe(options: &Train, task: &Task, course: &Course, tell: &Tel
     ));
     let starts = task.starts(course);
     if starts > 1 {
-        let last = match task.finalists() {
-            1 => "one comes to the end",
-            _ => "one comes to the end, from the mean of its last rivals that are like it",
+        let last = match task.finalists(course) {
+            1 => "the cheapest goes on",
+            _ => "near the end those that agree are averaged, and one goes on from there",
         };
         tell.say(format_args!(
             "starts     {starts}; those that cost most on the training samples end early; {last}"
@@ -54,7 +54,7 @@ pub(in crate::commands) fn taken(starts: &[Start]) -> String {
     match starts.len() {
         0 | 1 => String::new(),
         count if whole.clone().count() == 1 => format!(
-            "; start {} of {count} is taken, the only one that came to the end: cost {:.4}",
+            "; start {} of {count} came to the end: cost {:.4}",
             number + 1,
             cost(taken)
         ),

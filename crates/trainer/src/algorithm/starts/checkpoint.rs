@@ -7,7 +7,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 /// Version of this file's meaning. A single start's file is that of its trainer.
-const VERSION: &str = "5 starts";
+const VERSION: &str = "6 starts";
 const DIGEST: &str = "state_sha256";
 
 /// The array of a start's own checkpoint.

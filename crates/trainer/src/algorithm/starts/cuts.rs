@@ -12,7 +12,7 @@ pub struct Cut {
     pub keep: usize,
     /// Whether the attraction counts: not before λ3 has begun to rise, when nothing has worked on it yet.
     pub attraction: bool,
-    /// Whether the one that goes on is drawn to the mean of those that cost about as little and are alike.
+    /// Whether the one that goes on is fitted to the mean of those that cost about as little and are alike.
     pub joins: bool,
 }
 
@@ -21,7 +21,7 @@ impl Cut {
     ///
     /// Where λ3 is about to rise, reconstruction and distortion show the maps that the pairs have creased: an eighth of the time is
     /// spent then. Half risen, the whole cost begins to say which will be cheap; at the full λ3 the order is nearly that of the end
-    /// (docs/measurements/starts.md), and the `finalists` go to it, at most half of all.
+    /// (docs/measurements/starts.md), and the `finalists` go on, at most half of all, until one is left in the last quarter.
     #[must_use]
     pub fn all(plan: &Plan, pairs: usize, (count, finalists): (usize, usize)) -> Vec<Self> {
         let last = plan.stage_epochs * pairs;
@@ -40,7 +40,7 @@ impl Cut {
         ];
         let mut live = count.max(1);
         let mut kept: Vec<Self> = Vec::new();
-        for (epoch, keep, last) in cuts {
+        for (epoch, keep, to_one) in cuts {
             let follows = kept.last().is_none_or(|cut| cut.epoch < epoch);
             if (keep < live && follows && epoch > 0) || epoch == total {
                 kept.retain(|cut| cut.epoch < epoch);
@@ -49,7 +49,7 @@ impl Cut {
                     epoch,
                     keep,
                     attraction: epoch > before,
-                    joins: last && running > 1,
+                    joins: to_one && running > 1,
                 });
                 live = keep;
             }
@@ -141,7 +141,7 @@ mod tests {
     }
 
     #[test]
-    fn the_finalists_are_left_for_the_last_stretch_but_never_more_than_half_of_all() {
+    fn the_finalists_are_left_at_the_full_attraction_but_never_more_than_half_of_all() {
         let last_stretch = |count, finalists| {
             let cuts = Cut::all(&Schedule::Fast.plan_for(3), 4, (count, finalists));
             cuts.iter().rev().nth(2).map(|cut| cut.keep)

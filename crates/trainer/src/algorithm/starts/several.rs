@@ -21,7 +21,7 @@ pub enum Judge {
 pub struct Several {
     /// Starts, at least one.
     pub count: usize,
-    /// So many of them (at most half of all, at least one) are left when one is drawn to the mean of those that cost about as little and
+    /// So many of them (at most half of all, at least one) are left at the full λ3. In the last quarter of what follows one is fitted to the mean of those that cost about as little and
     /// are alike, and goes on alone. With one there is no mean.
     pub finalists: usize,
     /// By what they are judged.

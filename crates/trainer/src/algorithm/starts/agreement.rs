@@ -8,9 +8,9 @@ use crate::network::Network;
 
 /// Rounds of Weiszfeld's iteration.
 const ROUNDS: usize = 50;
-/// A distance below this share of the mean one counts as it, so that the midst may lie on a map.
+/// Smaller distances count as this share of the mean distance, so that no weight is infinite.
 const NEAR: f64 = 1e-3;
-/// Where all are the same map.
+/// The least distance where all maps are equal.
 const SAME: f64 = 1e-30;
 
 /// Maps are alike up to this mean squared distance from the median, as a share of its image's variance (as NMSE counts): good ones lie
@@ -24,18 +24,21 @@ pub(super) fn image(f: &Network<f32>, inputs: &Matrix) -> Vec<f32> {
 
 /// The mean of those of `images` that are alike, each of the same inputs with so many `columns`, and which of all is nearest to the
 /// geometric median (Weiszfeld 1937), the first of equals. There is no mean of a single one.
-pub(super) fn midst(images: &[Vec<f32>], columns: usize) -> (usize, Option<Vec<f32>>) {
-    let mut midst = weighted_mean(images, &vec![1.0; images.len()]);
-    let mut distances = Vec::new();
-    for _ in 0..=ROUNDS {
-        distances = images.iter().map(|image| distance(image, &midst)).collect();
+pub(super) fn agreement(images: &[Vec<f32>], columns: usize) -> (usize, Option<Vec<f32>>) {
+    let mut median = weighted_mean(images, &vec![1.0; images.len()]);
+    let to = |median: &[f64]| -> Vec<f64> {
+        images.iter().map(|image| distance(image, median)).collect()
+    };
+    for _ in 0..ROUNDS {
+        let distances = to(&median);
         let least = NEAR * distances.iter().sum::<f64>() / images.len() as f64;
         let weight = |distance: &f64| 1.0 / distance.max(least).max(SAME);
         let weights: Vec<f64> = distances.iter().map(weight).collect();
-        midst = weighted_mean(images, &weights);
+        median = weighted_mean(images, &weights);
     }
+    let distances = to(&median);
     let nearest = (0..images.len()).min_by(|a, b| distances[*a].total_cmp(&distances[*b]));
-    let bound = libm::sqrt(ALIKE * spread(&midst, columns));
+    let bound = libm::sqrt(ALIKE * spread(&median, columns));
     let is_alike = |distance: &f64| f64::from(u8::from(*distance <= bound));
     let alike: Vec<f64> = distances.iter().map(is_alike).collect();
     let mean = (alike.iter().sum::<f64>() > 1.0).then(|| {
@@ -69,8 +72,8 @@ fn weighted_mean(images: &[Vec<f32>], weights: &[f64]) -> Vec<f64> {
 }
 
 /// Root of the sum of squared differences.
-fn distance(image: &[f32], midst: &[f64]) -> f64 {
-    let pairs = image.iter().zip(midst);
+fn distance(image: &[f32], median: &[f64]) -> f64 {
+    let pairs = image.iter().zip(median);
     let squares = pairs.map(|(a, b)| (f64::from(*a) - b).powi(2));
     libm::sqrt(squares.sum())
 }
@@ -87,7 +90,7 @@ mod tests {
     #[test]
     fn the_mean_is_of_those_that_are_alike_however_far_the_others_are() {
         let images = [90.0, 0.0, 0.3, 0.2, 0.1, -90.0].map(line);
-        let (nearest, mean) = midst(&images, 1);
+        let (nearest, mean) = agreement(&images, 1);
         assert!((1..5).contains(&nearest));
         let mean = mean.unwrap();
         let want = line(0.15);
@@ -100,14 +103,14 @@ mod tests {
     #[test]
     fn of_maps_that_agree_on_nothing_the_middle_one_stays_as_it_is() {
         let images = [-50.0, 0.0, 70.0].map(line);
-        assert_eq!(midst(&images, 1), (1, None));
+        assert_eq!(agreement(&images, 1), (1, None));
     }
 
     #[test]
     fn one_map_is_left_as_it_is_and_equal_ones_are_their_own_mean() {
-        assert_eq!(midst(&[line(1.0)], 1), (0, None));
-        assert_eq!(midst(&[], 1), (0, None));
-        assert_eq!(midst(&vec![line(1.0); 7], 1), (0, Some(line(1.0))));
+        assert_eq!(agreement(&[line(1.0)], 1), (0, None));
+        assert_eq!(agreement(&[], 1), (0, None));
+        assert_eq!(agreement(&vec![line(1.0); 7], 1), (0, Some(line(1.0))));
     }
 
     #[test]
