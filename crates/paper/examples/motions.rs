@@ -3,7 +3,7 @@
 //!
 //! `cargo run --release -p paper --example motions -- FOLDER/hand.csv`, a file of the example `goals` with a motion for each seed. One
 //! line a motion: share of the angles' variance beyond its first four principal axes; d̄, VO, d-Knn of the affine map on the
-//! held-out frames; those of the trained map. At the end rank correlations with the trained map's d-Knn.
+//! held-out frames; those of the trained map.
 
 #[path = "common/domain.rs"]
 mod domain;
@@ -65,26 +65,8 @@ fn measures(map: &Affine, test: &Test<'_>) -> [f64; 3] {
     ]
 }
 
-/// The rank of each value among all.
-fn ranks(values: &[f64]) -> Vec<f64> {
-    let below = |v: &f64| values.iter().filter(|other| *other < v).count() as f64;
-    values.iter().map(below).collect()
-}
-
-/// Spearman's rank correlation.
-fn rank_correlation(a: &[f64], b: &[f64]) -> f64 {
-    let centred = |values: &[f64]| {
-        let ranks = ranks(values);
-        let mean = ranks.iter().sum::<f64>() / ranks.len() as f64;
-        ranks.into_iter().map(move |rank| rank - mean)
-    };
-    let of = |a: &[f64], b: &[f64]| -> f64 { centred(a).zip(centred(b)).map(|(a, b)| a * b).sum() };
-    of(a, b) / (of(a, a) * of(b, b)).sqrt()
-}
-
 fn main() -> Result<()> {
     let file = std::env::args().nth(1).ok_or("FOLDER/hand.csv")?;
-    let mut columns: [Vec<f64>; 8] = Default::default();
     println!("motion,off,affine_d,affine_vo,affine_dknn,d,vo,dknn");
     let text = std::fs::read_to_string(file)?;
     let mut lines: Vec<Vec<f64>> = text
@@ -104,25 +86,8 @@ fn main() -> Result<()> {
                 .sum::<f64>();
         let map = meant(&mut domain)?;
         let [affine_d, affine_vo, affine_dknn] = measures(&map, &domain.test());
-        let row = [seed, off, affine_d, affine_vo, affine_dknn, d, vo, dknn];
-        for (column, value) in columns.iter_mut().zip(row) {
-            column.push(value);
-        }
         println!(
             "{seed},{off:.4},{affine_d:.2},{affine_vo:.3},{affine_dknn:.2},{d:.2},{vo:.3},{dknn:.2}"
-        );
-    }
-    let [_, off, _, affine_vo, affine_dknn, d, vo, dknn] = &columns;
-    for (name, other) in [
-        ("off", off),
-        ("affine_vo", affine_vo),
-        ("affine_dknn", affine_dknn),
-        ("d", d),
-        ("vo", vo),
-    ] {
-        println!(
-            "rank correlation of dknn with {name}: {:.2}",
-            rank_correlation(dknn, other)
         );
     }
     Ok(())
