@@ -44,7 +44,6 @@ fn start(domain: &mut Domain, seed: u64) -> Result<Whole> {
     let usual = Usual::of_target(domain.targets.cols);
     let settings = Settings {
         schedule: Schedule::Custom(usual.plan(Schedule::Fast.plan_for(domain.targets.cols))),
-        initialisation: usual.initialisation,
         threads: 1,
         seed,
         ..domain.settings.clone()

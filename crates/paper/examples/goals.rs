@@ -103,7 +103,6 @@ fn line(data: &str, seed: u64) -> Result<String> {
     let plan = usual.plan(Schedule::Fast.plan_for(domain.targets.cols));
     let settings = Settings {
         schedule: Schedule::Custom(plan),
-        initialisation: usual.initialisation,
         threads: 1,
         ..domain.settings.clone()
     };

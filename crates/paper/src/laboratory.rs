@@ -13,7 +13,7 @@ use trainer::hand::table3;
 use trainer::hand::{Draw, Scripted, Space};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::{Metadata, Model, Normalisation};
-use trainer::network::Network;
+use trainer::network::{Initialisation, Network};
 use trainer::operator::{GroundTruth, Operator};
 
 /// Target samples of every experiment (§3.2.1, §3.3.2).
@@ -346,7 +346,7 @@ fn several_starts(
 
 fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
     let initialisation = match cell.row {
-        Row::HaeStarts => cell.usual().initialisation,
+        Row::HaeStarts => Initialisation::Glorot,
         _ => cell.initialisation,
     };
     Settings {

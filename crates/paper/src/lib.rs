@@ -269,7 +269,7 @@ impl Cell {
         let spreads = !matches!(self.row, Row::Pin | Row::CaePin);
         let rises = self.epochs() - plan.last_epochs.saturating_sub(plan.ramp_start);
         let (mut from, mut live, mut work) = (0, self.starts(), 0.0);
-        for cut in Cut::all(&plan, self.pairs, (live, self.usual().finalists)) {
+        for cut in Cut::all(&plan, self.pairs, &self.usual().several(live)) {
             let spreading = if spreads {
                 cut.epoch.saturating_sub(rises.max(from))
             } else {

@@ -105,7 +105,7 @@ pub struct Course {
     /// Hidden units.
     pub hidden: usize,
     /// How the weights start.
-    pub initialisation: Option<Initialisation>,
+    pub initialisation: Initialisation,
     /// Starts, of which one map comes; one is the paper's way. None said: as many as usual.
     pub starts: Option<usize>,
     /// No more starts than are likely to end within this time; one in any case.
@@ -133,7 +133,7 @@ impl Course {
             epochs,
             rate: None,
             hidden: HIDDEN,
-            initialisation: None,
+            initialisation: Initialisation::Glorot,
             starts: None,
             within: None,
             seed,
@@ -184,13 +184,8 @@ impl Course {
         settings.schedule = Schedule::Custom(self.plan(task.targets.cols, &task.usual));
         settings.answers = task.answers.clone();
         settings.hidden = self.hidden;
-        let is_several = self.starts(&task.usual) > 1;
-        settings.initialisation = match self.initialisation {
-            Some(said) => said,
-            None if is_several => task.usual.initialisation,
-            None => Initialisation::Glorot,
-        };
-        let usual = match is_several {
+        settings.initialisation = self.initialisation;
+        let usual = match self.starts(&task.usual) > 1 {
             true => std::thread::available_parallelism().map_or(1, usize::from),
             false => settings.threads,
         };
@@ -227,7 +222,7 @@ impl Task {
         course.starts(&self.usual)
     }
 
-    /// Starts of which the mean is taken in the last quarter; one: there is none.
+    /// Starts of which the mean is taken; one: there is none.
     pub fn finalists(&self, course: &Course) -> usize {
         self.usual.finalists.min(self.starts(course).div_ceil(2))
     }

@@ -2,8 +2,8 @@
 //! lie, and no later step turns it over.
 //!
 //! The starts differ in their initial weights and the order of their mini-batches, and each chooses its own pairs. At each [`Cut`] those
-//! go on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise. In the last
-//! quarter one is fitted to the mean of those that cost about as little and are alike, and is trained to the end.
+//! go on that cost least by Eq. 13 without Pin, over all training inputs and targets, at the full λ3 once it has begun to rise. One of the
+//! last is fitted to the mean of those that cost about as little and are alike, and is trained to the end.
 //! No truth is asked, no held-out sample looked at.
 //!
 //! [`Starts`] is a machine as [`Trainer`] is: told how far to go, left, kept and taken up between any two steps; what comes out depends on
@@ -75,7 +75,7 @@ impl Starts {
     ) -> Result<Self, Error> {
         let count = several.count.max(1);
         let plan = settings.schedule.plan_for(x.cols);
-        let cuts = Cut::all(&plan, settings.pairs.count(), (count, several.finalists));
+        let cuts = Cut::all(&plan, settings.pairs.count(), &several);
         let settings = settings.clone();
         let runners: Result<Vec<Runner>, Error> = (0..count)
             .map(|number| {
@@ -258,8 +258,11 @@ impl Starts {
         let trainer = &self.runners[self.best()].trainer;
         let plan = self.settings.schedule.plan_for(self.x.cols);
         let seconds = |count: usize| {
-            let finalists = self.several.finalists;
-            let cuts = Cut::all(&plan, self.settings.pairs.count(), (count, finalists));
+            let several = Several {
+                count,
+                ..self.several
+            };
+            let cuts = Cut::all(&plan, self.settings.pairs.count(), &several);
             cuts::seconds((&cuts, count), (0, 0), (threads, now), &|epochs| {
                 trainer.seconds(epochs)
             })

@@ -107,13 +107,12 @@ pub struct Train {
     /// Hidden units (1 to 65535); the bridge runs 300.
     #[arg(long, value_name = "H", default_value_t = 300, value_parser = clap::value_parser!(u32).range(1..=65_535))]
     pub hidden: u32,
-    /// Starts that differ in their first weights (1 to 64): those that cost most on the training samples end early; near the end
+    /// Starts that differ in their first weights (1 to 64): those that cost most on the training samples end early; then
     /// the remaining ones that agree are averaged, and one goes on from there (hands: the cheapest goes on); 1 is the paper's way [default: 32, targets of more than 2
-    /// dimensions 12, hands 6, with --live as many of them as end in 20 s; 1 with --schedule paper or another --cost].
+    /// dimensions 8, hands 6, with --live as many of them as end in 20 s; 1 with --schedule paper or another --cost].
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=64))]
     pub starts: Option<u8>,
-    /// Weights that start normally distributed with this deviation (0.1, say), or Glorot's uniform ones
-    /// [default: glorot; 0.03 for several starts of other domains than hands].
+    /// Weights that start normally distributed with this deviation (0.1, say), or Glorot's uniform ones [default: glorot].
     #[arg(long, value_name = "DEVIATION|glorot", value_parser = initialisation)]
     pub normal: Option<Initialisation>,
     /// Seed of everything random: the same seed trains the same map (with --live of as many starts, which it says).

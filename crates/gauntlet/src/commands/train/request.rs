@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::Result;
 use host::trainer::hand::Space;
+use host::trainer::network::Initialisation;
 
 use super::args::Train;
 use crate::progress::Person;
@@ -84,7 +85,7 @@ pub(super) fn course(options: &Train) -> Course {
         epochs: options.epochs.map(|epochs| epochs as usize),
         rate: options.rate,
         hidden: options.hidden as usize,
-        initialisation: options.normal,
+        initialisation: options.normal.unwrap_or(Initialisation::Glorot),
         starts: options.starts.map(usize::from),
         within: (options.live && options.starts.is_none()).then_some(LAST_STAGE),
         seed: options.seed,

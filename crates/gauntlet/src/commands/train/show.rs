@@ -24,7 +24,7 @@ pub(super) fn describe(options: &Train, task: &Task, course: &Course, tell: &Tel
     if starts > 1 {
         let last = match task.finalists(course) {
             1 => "the cheapest goes on",
-            _ => "near the end those that agree are averaged, and one goes on from there",
+            _ => "then those that agree are averaged, and one goes on from there",
         };
         tell.say(format_args!(
             "starts     {starts}; those that cost most on the training samples end early; {last}"

@@ -1,5 +1,6 @@
 //! When starts are judged, and how many go on.
 
+use super::Several;
 use crate::algorithm::Plan;
 use core::ops::Range;
 
@@ -17,24 +18,25 @@ pub struct Cut {
 }
 
 impl Cut {
-    /// The cuts of a training with this plan, `pairs` early stages and `count` starts; the last at its end, where one is kept.
+    /// The cuts of a training with this plan, `pairs` early stages and several starts; the last at its end, where one is kept.
     ///
     /// Where λ3 is about to rise, reconstruction and distortion show the maps that the pairs have creased: an eighth of the time is
     /// spent then. Half risen, the whole cost begins to say which will be cheap; at the full λ3 the order is nearly that of the end
-    /// (docs/measurements/starts.md), and the `finalists` go on, at most half of all, until one is left in the last quarter.
+    /// (docs/measurements/starts.md), and the finalists go on, at most half of all, until they are joined.
     #[must_use]
-    pub fn all(plan: &Plan, pairs: usize, (count, finalists): (usize, usize)) -> Vec<Self> {
+    pub fn all(plan: &Plan, pairs: usize, several: &Several) -> Vec<Self> {
+        let count = several.count;
         let last = plan.stage_epochs * pairs;
         let total = last + plan.last_epochs;
         let before = (last + plan.ramp_start).min(total);
         let rising = (last + plan.ramp_start + plan.ramp_epochs / 2).min(total);
         let risen = (last + plan.ramp_start + plan.ramp_epochs).min(total);
-        let joined = (risen + 3 * total) / 4;
+        let joined = risen + (several.joined * (total - risen) as f64) as usize;
         let half = count.div_ceil(2).max(1);
         let cuts = [
             (before, (2 * count).div_ceil(3), false),
             (rising, half, false),
-            (risen, finalists.clamp(1, half), false),
+            (risen, several.finalists.clamp(1, half), false),
             (joined, 1, true),
             (total, 1, true),
         ];
@@ -98,14 +100,19 @@ pub(super) fn seconds(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::algorithm::Schedule;
+    use crate::algorithm::starts::Usual;
+    use crate::algorithm::{Plan, Schedule};
+
+    fn cuts(plan: &Plan, count: usize) -> Vec<Cut> {
+        Cut::all(plan, 4, &Usual::PLANE.several(count))
+    }
 
     #[test]
     fn fewer_starts_go_on_after_each_cut_and_one_is_left_at_the_end() {
         for count in 1..40 {
             for schedule in [Schedule::Fast, Schedule::Paper] {
                 let plan = schedule.plan_for(2);
-                let cuts = Cut::all(&plan, 4, (count, 6));
+                let cuts = cuts(&plan, count);
                 assert!(
                     cuts.windows(2)
                         .all(|w| w[0].epoch < w[1].epoch && w[0].keep >= w[1].keep)
@@ -122,7 +129,7 @@ mod tests {
                 );
             }
         }
-        assert_eq!(Cut::all(&Schedule::Fast.plan_for(2), 4, (1, 6)).len(), 1);
+        assert_eq!(cuts(&Schedule::Fast.plan_for(2), 1).len(), 1);
     }
 
     #[test]
@@ -130,7 +137,7 @@ mod tests {
         for epochs in [1, 2, 8, 100] {
             for count in 1..13 {
                 let plan = Schedule::Fast.plan_for(2).with_last_epochs(epochs);
-                let cuts = Cut::all(&plan, 4, (count, 6));
+                let cuts = cuts(&plan, count);
                 let joins: Vec<&Cut> = cuts.iter().filter(|cut| cut.joins).collect();
                 // Two and fewer starts have one finalist.
                 let once = usize::from(count > 2);
@@ -143,7 +150,11 @@ mod tests {
     #[test]
     fn the_finalists_are_left_at_the_full_attraction_but_never_more_than_half_of_all() {
         let last_stretch = |count, finalists| {
-            let cuts = Cut::all(&Schedule::Fast.plan_for(3), 4, (count, finalists));
+            let several = Several {
+                finalists,
+                ..Usual::SURFACE.several(count)
+            };
+            let cuts = Cut::all(&Schedule::Fast.plan_for(3), 4, &several);
             cuts.iter().rev().nth(2).map(|cut| cut.keep)
         };
         assert_eq!(last_stretch(12, 6), Some(6));
@@ -153,25 +164,27 @@ mod tests {
 
     #[test]
     fn the_cuts_of_the_fast_schedule_are_those_that_were_measured() {
-        let cuts = Cut::all(&Schedule::Fast.plan_for(2), 4, (32, 6));
-        let told: Vec<(usize, usize, bool, bool)> = (cuts.iter())
-            .map(|cut| (cut.epoch, cut.keep, cut.attraction, cut.joins))
-            .collect();
-        // 1,200 early epochs; λ3 rises from 2,000 to 2,500.
+        let told = |cuts: &[Cut]| -> Vec<(usize, usize, bool, bool)> {
+            (cuts.iter())
+                .map(|cut| (cut.epoch, cut.keep, cut.attraction, cut.joins))
+                .collect()
+        };
+        // 600 early epochs; λ3 rises from 1,000 to 1,500.
+        let cuts = cuts(&Usual::PLANE.plan(Schedule::Fast.plan_for(2)), 32);
         let want = [
-            (2000, 22, false, false),
-            (2250, 16, true, false),
-            (2500, 6, true, false),
-            (3775, 1, true, true),
-            (4200, 1, true, false),
+            (1000, 22, false, false),
+            (1250, 16, true, false),
+            (1500, 6, true, false),
+            (2640, 1, true, true),
+            (4350, 1, true, false),
         ];
-        assert_eq!(told, want);
-        // Where a step with attraction costs six without: 11 whole trainings, of 15,200 each.
+        assert_eq!(told(&cuts), want);
+        // Where a step with attraction costs six without.
         let price = |epochs: Range<usize>| {
-            let with = epochs.end.max(2000) - epochs.start.max(2000);
+            let with = epochs.end.max(1000) - epochs.start.max(1000);
             (epochs.len() - with + 6 * with) as f64
         };
-        assert_eq!(seconds((&cuts, 32), (0, 0), (1, 1), &price), 169_450.0);
+        assert_eq!(seconds((&cuts, 32), (0, 0), (1, 1), &price), 140_300.0);
     }
 
     #[test]

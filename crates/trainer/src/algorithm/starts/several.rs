@@ -16,14 +16,16 @@ pub enum Judge {
     CostInTarget,
 }
 
-/// How many starts, and by what they are judged.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How many starts, when one is left of them, and by what they are judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Several {
     /// Starts, at least one.
     pub count: usize,
-    /// So many of them (at most half of all, at least one) are left at the full λ3. In the last quarter of what follows one is fitted to the mean of those that cost about as little and
-    /// are alike, and goes on alone. With one there is no mean.
+    /// So many of them (at most half of all, at least one) are left at the full λ3.
     pub finalists: usize,
+    /// After this share of the epochs at the full λ3, 0 to 1, one of the finalists is fitted to the mean of those that cost about as
+    /// little and are alike, and goes on alone. Of one finalist there is no mean.
+    pub joined: f64,
     /// By what they are judged.
     pub judge: Judge,
 }
@@ -33,6 +35,7 @@ impl Several {
     pub const ONE: Self = Self {
         count: 1,
         finalists: 1,
+        joined: 1.0,
         judge: Judge::Cost,
     };
 }

@@ -16,6 +16,7 @@ fn several(count: usize) -> Several {
     Several {
         count,
         finalists: 3,
+        joined: 0.75,
         judge: Judge::Cost,
     }
 }

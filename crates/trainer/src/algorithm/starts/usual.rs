@@ -2,7 +2,6 @@
 
 use super::{Judge, Several};
 use crate::algorithm::Plan;
-use crate::network::Initialisation;
 
 /// How many starts, and what differs in them from the paper's one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -11,10 +10,12 @@ pub struct Usual {
     pub count: usize,
     /// [`Several::finalists`].
     pub finalists: usize,
-    /// How the weights start.
-    pub initialisation: Initialisation,
-    /// [`Plan::stage_reconstruction`].
-    pub stage_reconstruction: f64,
+    /// [`Several::joined`].
+    pub joined: f64,
+    /// Factor of [`Plan::stage_epochs`] and [`Plan::ramp_start`]: of many starts some lie right without going on for long.
+    pub before_rise: f64,
+    /// Factor of [`Plan::last_epochs`]: where one is left early, more of them take little time.
+    pub last_stage: f64,
     /// By what they are judged.
     pub judge: Judge,
 }
@@ -24,21 +25,25 @@ impl Usual {
     pub const PLANE: Self = Self {
         count: 32,
         finalists: 6,
-        initialisation: Initialisation::Normal(0.03),
-        stage_reconstruction: 1.0,
+        joined: 0.4,
+        before_rise: 0.5,
+        last_stage: 1.25,
         judge: Judge::Cost,
     };
     /// For surfaces in space and more dimensions that no hand is in; they take longer, and hardly ever fold.
     pub const SURFACE: Self = Self {
-        count: 12,
+        count: 8,
+        joined: 0.65,
+        last_stage: 1.0,
         ..Self::PLANE
     };
     /// For hands.
     pub const HAND: Self = Self {
         count: 6,
         finalists: 1,
-        initialisation: Initialisation::Glorot,
-        stage_reconstruction: 1.0,
+        joined: 1.0,
+        before_rise: 1.0,
+        last_stage: 1.0,
         judge: Judge::CostInTarget,
     };
 
@@ -48,6 +53,7 @@ impl Usual {
         Several {
             count,
             finalists: self.finalists,
+            joined: self.joined,
             judge: self.judge,
         }
     }
@@ -64,8 +70,11 @@ impl Usual {
     /// The schedule's numbers with those of the starts.
     #[must_use]
     pub fn plan(&self, plan: Plan) -> Plan {
+        let times = |epochs: usize, factor: f64| (epochs as f64 * factor) as usize;
         Plan {
-            stage_reconstruction: self.stage_reconstruction,
+            stage_epochs: times(plan.stage_epochs, self.before_rise),
+            ramp_start: times(plan.ramp_start, self.before_rise),
+            last_epochs: times(plan.last_epochs, self.last_stage),
             ..plan
         }
     }
