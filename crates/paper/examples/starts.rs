@@ -34,12 +34,12 @@ const EACH: &str =
 const PAIRS: &str = "data,schedule,normal,seed,start,pair,size,gap,apart,other,target";
 const BEST: &str = "data,schedule,normal,seed,starts,taken,d,vo,dknn,nmse,s,costs";
 
-/// The settings by the schedule's word.
-fn scheduled(mut settings: Settings, word: &str, dimensions: usize) -> Result<Settings> {
+/// The settings by the schedule's word, from the paper's plan or the fast one.
+fn scheduled(mut settings: Settings, word: &str, plans: [Plan; 2]) -> Result<Settings> {
     let mut words = word.split(',');
     let mut plan = match words.next() {
-        Some("paper") => Schedule::Paper.plan_for(dimensions),
-        _ => Schedule::Fast.plan_for(dimensions),
+        Some("paper") => plans[0],
+        _ => plans[1],
     };
     let lambda = &mut settings.lambda;
     for word in words {
@@ -325,7 +325,12 @@ fn main() -> Result<()> {
         for number in 0..if each { count } else { 1 } {
             let mut domain = domain(data, seed)?;
             let settings = domain.settings.clone();
-            let mut settings = scheduled(settings, schedule, domain.targets.cols)?;
+            let plan = |schedule: Schedule| schedule.plan_for(domain.targets.cols);
+            let fast = match each {
+                true => plan(Schedule::Fast),
+                false => usual(&domain).plan(plan(Schedule::Fast)),
+            };
+            let mut settings = scheduled(settings, schedule, [plan(Schedule::Paper), fast])?;
             settings.threads = 1;
             settings.seed = start_seed(seed, number);
             if let Ok(deviation) = normal.parse() {

@@ -13,7 +13,7 @@ use trainer::hand::table3;
 use trainer::hand::{Draw, Scripted, Space};
 use trainer::measures::{Coverage, Measures, Test, measure};
 use trainer::model::{Metadata, Model, Normalisation};
-use trainer::network::{Initialisation, Network};
+use trainer::network::Network;
 use trainer::operator::{GroundTruth, Operator};
 
 /// Target samples of every experiment (§3.2.1, §3.3.2).
@@ -345,10 +345,6 @@ fn several_starts(
 }
 
 fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
-    let initialisation = match cell.row {
-        Row::HaeStarts => Initialisation::Glorot,
-        _ => cell.initialisation,
-    };
     Settings {
         cost: cell.row.cost(),
         lambda: Lambda {
@@ -359,7 +355,7 @@ fn settings(cell: &Cell, plan: PairPlan, lambda: Lambda) -> Settings {
             Row::HaeStarts => Schedule::Custom(cell.plan()),
             _ => cell.schedule,
         },
-        initialisation,
+        initialisation: cell.initialisation,
         // Cells run side by side: one thread each.
         threads: 1,
         ..Settings::shapes(plan, cell.seed)

@@ -198,7 +198,7 @@ pub struct Cell {
     pub schedule: Schedule,
     /// Measure also every so many epochs; 0: only at the end.
     pub trace_every: usize,
-    /// How the weights start; of several starts those of [`Usual`] do as it says.
+    /// How the weights start.
     pub initialisation: Initialisation,
 }
 
@@ -231,8 +231,8 @@ impl Cell {
             Source::Generated | Source::Recorded => 4,
         };
         let plan = self.schedule.plan_for(dimensions);
-        match self.row {
-            Row::HaeStarts => self.usual().plan(plan),
+        match (self.row, self.schedule) {
+            (Row::HaeStarts, Schedule::Fast) => self.usual().plan(plan),
             _ => plan,
         }
     }
@@ -304,7 +304,10 @@ impl Cell {
         };
         let starts = match self.starts() {
             1 => String::new(),
-            starts => format!("{starts}-{}", self.usual().finalists),
+            starts => {
+                let usual = self.usual();
+                format!("{starts}-{}-{}", usual.finalists, usual.joined)
+            }
         };
         let start = match self.initialisation {
             Initialisation::Glorot => String::new(),

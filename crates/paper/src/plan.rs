@@ -144,9 +144,13 @@ impl Frame {
             (Row::HaeStarts, Schedule::Paper) => Schedule::Fast,
             (_, schedule) => schedule,
         };
+        let initialisation = match row {
+            Row::HaeStarts => Initialisation::Glorot,
+            _ => self.initialisation,
+        };
         let cell = Cell {
             schedule,
-            initialisation: self.initialisation,
+            initialisation,
             ..Cell::of_table(source, row, seed)
         };
         // By the plan of this very cell: a hand's is another than a plane's.
@@ -262,6 +266,7 @@ pub const APPENDIX: [Source; 3] = [
 #[cfg(test)]
 mod tests {
     use super::*;
+    use trainer::algorithm::starts::Usual;
 
     fn frame() -> Frame {
         Frame {
@@ -284,6 +289,11 @@ mod tests {
             let wanted = Schedule::Fast.plan_for(dimensions).with_last_epochs(500);
             assert_eq!(frame.cells(what)[0].plan(), wanted, "{what:?}");
         }
+        // Several starts have a schedule of their own, and once.
+        let ours = frame.cell(Source::Shape(ShapePair::Sp1), Row::HaeStarts, 1);
+        let usual = Usual::PLANE.plan(Schedule::Fast.plan_for(2));
+        assert_eq!(ours.plan(), usual.with_last_epochs(500));
+        assert!(usual.stage_epochs < Schedule::Fast.plan_for(2).stage_epochs);
         assert!(frame.describe().contains("500 epochs") && !frame.is_full());
     }
 

@@ -144,16 +144,20 @@ impl Course {
         }
     }
 
+    /// Whether neither the schedule nor the cost is one of the paper's others.
+    fn is_ours(&self) -> bool {
+        self.schedule != Schedule::Paper && self.cost == Cost::Hae
+    }
+
     /// How many starts: one with the paper's schedule and for its other costs.
     pub(super) fn starts(&self, usual: &Usual) -> usize {
-        let is_ours = self.schedule != Schedule::Paper && self.cost == Cost::Hae;
-        let most = if is_ours { usual.count } else { 1 };
+        let most = if self.is_ours() { usual.count } else { 1 };
         self.starts.unwrap_or(most).clamp(1, MOST)
     }
 
     pub(super) fn plan(&self, target_dimensions: usize, usual: &Usual) -> Plan {
         let mut plan = self.schedule.plan_for(target_dimensions);
-        if self.starts(usual) > 1 {
+        if self.is_ours() && self.starts(usual) > 1 {
             plan = usual.plan(plan);
         }
         if let Some(epochs) = self.epochs {

@@ -20,18 +20,18 @@ pub struct Cut {
 impl Cut {
     /// The cuts of a training with this plan, `pairs` early stages and several starts; the last at its end, where one is kept.
     ///
-    /// Where λ3 is about to rise, reconstruction and distortion show the maps that the pairs have creased: an eighth of the time is
-    /// spent then. Half risen, the whole cost begins to say which will be cheap; at the full λ3 the order is nearly that of the end
+    /// Where λ3 is about to rise, reconstruction and distortion show the maps that the pairs have creased. Half risen, the whole cost begins to say which will be cheap; at the full λ3 the order is nearly that of the end
     /// (docs/measurements/starts.md), and the finalists go on, at most half of all, until they are joined.
     #[must_use]
     pub fn all(plan: &Plan, pairs: usize, several: &Several) -> Vec<Self> {
-        let count = several.count;
+        let count = several.count.max(1);
         let last = plan.stage_epochs * pairs;
         let total = last + plan.last_epochs;
         let before = (last + plan.ramp_start).min(total);
         let rising = (last + plan.ramp_start + plan.ramp_epochs / 2).min(total);
         let risen = (last + plan.ramp_start + plan.ramp_epochs).min(total);
         let joined = risen + (several.joined * (total - risen) as f64) as usize;
+        let joined = joined.max(risen + 1).min(total);
         let half = count.div_ceil(2).max(1);
         let cuts = [
             (before, (2 * count).div_ceil(3), false),
